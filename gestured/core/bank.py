@@ -51,7 +51,7 @@ class Banks:
             return
         front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
-        arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.own}
+        arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.source_heard}
         if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
             frames = min(max(LEAD_S / front.pace.interval_s, 1.0), LEAD_FRAMES)  # slow sensors keep one, too
             kind = (*front.kind, stamper.by_tag, 2 << math.ceil(math.log2(frames)))
@@ -135,8 +135,9 @@ class Bank:
             idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
             activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # activity and number of frames taken here
         )  # fmt: skip
-        assert front.shown is not None
-        self._taxels[row] = idle.counts, idle.sigma, front.conditioner.weight, idle.compared, front.shown.reshape(-1)
+        assert front.last_sent is not None
+        sent, weight = front.last_sent.reshape(-1), front.conditioner.weight
+        self._taxels[row] = idle.counts, idle.sigma, weight, idle.compared, sent
         self._when[row] = -math.inf
         self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
         self._rows[sensor.name] = self._free.pop()
@@ -153,7 +154,7 @@ class Bank:
         front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
         conditioner, cutter = front.conditioner, front.cutter
         idle, activity = conditioner.idle, conditioner.activity
-        owner.heard = owner.own = vitals.last = stamper.arrived = arrived
+        owner.heard = owner.source_heard = vitals.last = stamper.arrived = arrived
         stamper.last = front.pace.last = idle.followed = last
         stamper.tag = None if math.isnan(tag) else tag
         if not math.isnan(counter):
@@ -171,9 +172,9 @@ class Bank:
             if t > -math.inf:
                 cutter.kept.append(Kept(t, higher, 0, None, since))
         cutter.trim(last)
-        front.shown = sent.reshape(front.sent)
-        raw = self._mounted(front.shown[np.newaxis])[0]
-        cutter.shown, cutter.new = raw.tobytes(), new
+        front.last_sent = sent.reshape(front.grid_sent)
+        raw = self._mounted(front.last_sent[np.newaxis])[0]
+        cutter.last_raw, cutter.new = raw.tobytes(), new
         front.look = Look(last, raw, above[-1], active, False, False, False)
         sensor.habits.see(front)  # it learns from the last idle frame before a contact
 
@@ -184,14 +185,14 @@ class Bank:
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
             self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
         ):
-            sensor.owner.heard = sensor.owner.own = sensor.stamper.arrived = heard
+            sensor.owner.heard = sensor.owner.source_heard = sensor.stamper.arrived = heard
             sensor.stamper.last = last
             sensor.front_end.pace.interval_s, sensor.vitals.jitter_s = interval, jitter
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
 
     def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
-        if block.values.shape[1:] != self._front.sent:
+        if block.values.shape[1:] != self._front.grid_sent:
             return
         owners = map(self._owners.get, block.sensors)
         mine = np.array([sources[n] == owner for n, owner in zip(block.packets, owners, strict=True)])
@@ -237,7 +238,7 @@ class Bank:
         since = t - last
         taken &= (since >= self._least_s) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
         sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
-        raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.sent))
+        raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.grid_sent))
 
         glanced = (taken & (t >= glance)).nonzero()[0]
         if glanced.size:

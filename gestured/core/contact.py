@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from gestured.core.timing import Timing
 
-Place = tuple[float, float]  # (row, column) in taxel pitches
+Centroid = tuple[float, float]  # (row, column) in taxel pitches
 
 RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
 ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, and a new contact must exceed it
@@ -27,7 +27,7 @@ class Stretch:
         self.widest = 0.0  # taxel pitches, the diagonal of the box that holds the way of its centroid
         self._box: tuple[float, float, float, float] | None = None  # top, left, bottom, right
 
-    def follow(self, place: Place) -> None:
+    def follow(self, place: Centroid) -> None:
         """The contact's centroid is at `place` now."""
         row, column = place
         top, left, bottom, right = self._box or (row, column, row, column)

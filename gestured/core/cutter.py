@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
-from gestured.core.contact import RESTS, Place
+from gestured.core.contact import RESTS, Centroid
 from gestured.core.frames import UNDISTURBED, Before, Segment
 from gestured.core.taxels import Inspection
 
@@ -40,7 +40,7 @@ class Kept(NamedTuple):
     t: float  # s
     above: NDArray[np.float64]  # (N,) counts above the baseline
     lost: int  # frames, just before this one
-    place: Place | None  # centroid, where the frame is touched
+    place: Centroid | None  # centroid, where the frame is touched
     new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
 
 
@@ -48,7 +48,7 @@ class Sight(NamedTuple):
     """Where the finger was seen."""
 
     t: float  # s
-    place: Place
+    place: Centroid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ class Cutter:
         self._made: Made | None = None
         self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
         self._settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
-        self.shown = b""  # raw counts of the last frame
+        self.last_raw = b""  # raw counts of the last frame
         self.new = 0.0  # s, since when the frames show just these counts
 
     def __len__(self) -> int:
@@ -92,12 +92,12 @@ class Cutter:
         """The sensor restarted: what was kept is no part of what follows."""
         self.kept.clear()
 
-    def keep(self, look: Look, lost: int, place: Place | None) -> None:
+    def keep(self, look: Look, lost: int, place: Centroid | None) -> None:
         """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
         t, shown = look.t, look.raw.tobytes()
-        if shown != self.shown or not self._conditioner.idle.lively:
+        if shown != self.last_raw or not self._conditioner.idle.lively:
             self.new = t
-        self.shown = shown
+        self.last_raw = shown
         self.kept.append(_new(Kept, (t, look.above, lost, place, self.new)))
 
     def trim(self, t: float) -> None:
@@ -198,10 +198,10 @@ def clear(before: Sequence[Sight], after: Sequence[Sight], travel: float) -> boo
     return math.hypot(*across) >= SLOWEST * usual * (after[0].t - before[-1].t)
 
 
-def _way(one: Sight, other: Sight) -> Place:
+def _way(one: Sight, other: Sight) -> Centroid:
     return other.place[0] - one.place[0], other.place[1] - one.place[1]
 
 
-def _turn(one: Place, other: Place) -> float:
+def _turn(one: Centroid, other: Centroid) -> float:
     """Radians from one way to another, positive to one side."""
     return math.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])

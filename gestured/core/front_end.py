@@ -70,7 +70,7 @@ class FrontEnd:
         wait_for_double_tap: bool = True,
         timing: Timing | None = None,
     ) -> None:
-        self.sent = (rows, columns)
+        self.grid_sent = (rows, columns)  # before mounting
         self.mounting = mounting or Mounting()
         self.timing = timing or Timing()
         self.rows, self.columns = self.mounting.shape(rows, columns)  # after mounting
@@ -79,8 +79,8 @@ class FrontEnd:
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self.cutter = Cutter(self.conditioner, travel)
         self.as_sent = self.mounting == Mounting()
-        self.shown: NDArray[np.generic] | None = None  # (R, C) counts of the last frame that was taken, as it was sent
-        self.look: Look | None = None  # what they show; None before the idle sensor is known
+        self.last_sent: NDArray[np.generic] | None = None  # (R, C) counts of the last frame that was taken
+        self.look: Look | None = None  # what that frame shows; None before the idle sensor is known
         # Whether the idle sensor is known without doubt, no taxel is bad, and nobody touches it. Then a bank may
         # take its next frame together with those of other sensors of the same `kind`.
         self.calm = False
@@ -140,7 +140,7 @@ class FrontEnd:
         raw = values.astype(np.float64).reshape(-1)
         found = self._pass(t)
         conditioner, segmenter, cutter = self.conditioner, self.segmenter, self.cutter
-        self.shown, self.look, self.calm = frame.values, None, False
+        self.last_sent, self.look, self.calm = frame.values, None, False
         if not conditioner.idle.known:
             if conditioner.settle(t, raw):
                 cutter.settled(t)
@@ -203,7 +203,7 @@ class FrontEnd:
     def wait(self, t: float) -> list[Found]:
         """No frame has come until `t` s: a contact may be over. A later frame finds the same."""
         until, over = min(t, self.pace.sure), self.segmenter.over
-        return [] if over is None or over > until else self._done(self.segmenter.flush(until, until), t)
+        return [] if over is None or over > until else self._done(self.segmenter.wait(until, until), t)
 
     @property
     def fleeting(self) -> bool:
@@ -229,7 +229,7 @@ class FrontEnd:
         segmenter, last = self.segmenter, self.pace.last
         if segmenter.phase.touched and last is not None:
             t = min(t, last + self.timing.stale_s)  # it was over then, whenever one asks
-            found += self._done(segmenter.flush(t, self.pace.sure), last)
+            found += self._done(segmenter.wait(t, self.pace.sure), last)
             if segmenter.phase.let_go:
                 found += self._close(segmenter.onset, segmenter.last_touched, t, last)
             elif segmenter.phase.touched:
@@ -238,8 +238,9 @@ class FrontEnd:
         self.cutter.silent()
         self.conditioner.idle.doubt()
         self.calm = False
-        if self.shown is not None:  # frames that were read together share their memory until the last of them is gone
-            self.shown = self.shown.copy()
+        # Frames that were read together share their memory until the last of them is gone.
+        if self.last_sent is not None:
+            self.last_sent = self.last_sent.copy()
         if self.look is not None:
             self.look = self.look._replace(raw=self.look.raw.copy(), above=self.look.above.copy())
         return found
@@ -256,7 +257,7 @@ class FrontEnd:
             found += self.flush(t)
         elif segmenter.phase.touched:
             found += self.wait(t)
-            found += self._done(segmenter.flush(t, self.pace.sure), t)
+            found += self._done(segmenter.wait(t, self.pace.sure), t)
         self.pace.take(t, step, after_silence=step > self.timing.stale_s)
         if not segmenter.phase.touched:
             segmenter.after.fade(t)

@@ -40,10 +40,10 @@ class Hub:
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
         self._banks = bank.Banks()
         self._missed = 0  # times that this machine had no room for a packet
-        self._seen = 0  # what `_missed` was when packets were read last
-        self._told: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
+        self._missed_read = 0  # what `_missed` was when packets were read last
+        self._missed_before: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
         self._owners: frozenset[Source] = frozenset()
-        self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
+        self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first contact of all sensors may be over
         self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
@@ -72,22 +72,22 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
-        if self._seen != self._missed:  # how many packets each sensor has missed is seen by their frames alone
+        if self._missed_read != self._missed:  # how many packets each sensor has missed is seen by their frames alone
             self._out(now, facts)
-            self._seen = self._missed
+            self._missed_read = self._missed
         together = len(packets) >= bank.FEW
         waited: list[Sensor] = []
         for name, arrivals in self._read(packets, now, facts, together=together).items():
             sensor = self._sensors[name]
             if name in self._waits:
                 sensor.elapse(now, facts)
-            due = sensor.receive(arrivals, now, facts, missed=self._told[name] != self._missed)
-            self._told[name] = self._missed
+            due = sensor.receive(arrivals, now, facts, missed=self._missed_before[name] != self._missed)
+            self._missed_before[name] = self._missed
             if due < math.inf:
                 self._waits[name], self._due = sensor, min(self._due, due)
             if sensor.shown is not None:
                 self.asks[name] = sensor
-            if (self._asked is None or self._asked) and sensor.looks:
+            if (self._foreseen is None or self._foreseen) and sensor.looks:
                 self.looks[name] = sensor
             waited.append(sensor)
         if together and len(waited) + len(self._banks.homes) >= bank.FEW:
@@ -127,10 +127,10 @@ class Hub:
         """No packets have come until `now`: contacts may be over."""
         facts: list[Fact] = []
         if now >= self._due:
-            for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.arrives):
+            for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.elapses_at):
                 sensor.elapse(now, facts)
             self.looks |= {name: sensor for name, sensor in self._waits.items() if sensor.looks}
-            due = {name: sensor.arrives for name, sensor in self._waits.items()}
+            due = {name: sensor.elapses_at for name, sensor in self._waits.items()}
             self._waits = {name: sensor for name, sensor in self._waits.items() if due[name] < math.inf}
             self._due = min(due.values(), default=math.inf)
         return facts
@@ -226,13 +226,13 @@ class Hub:
 
         It costs up to 15 runs of the model a second and sensor while it is touched.
         """
-        self._asked = None if sensors is None else frozenset(sensors)
+        self._foreseen = None if sensors is None else frozenset(sensors)
         for sensor in self._sensors.values():
             sensor.foresee(asked=self.foreseen(sensor.name), later=self._later)
 
     def foreseen(self, name: str) -> bool:
         """Whether somebody asks for a sensor's provisional events."""
-        return self._asked is None or name in self._asked
+        return self._foreseen is None or name in self._foreseen
 
     def follow(self, sensors: Collection[str] | None) -> list[Fact]:
         """Give touch events of these sensors, by name, or of all (None), if the scene has `touch`."""
@@ -371,7 +371,7 @@ class Hub:
         sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
         sensor.foresee(asked=self.foreseen(name), later=self._later)
         sensor.follow(facts, asked=self._follows(name))
-        self._told[name] = self._missed
+        self._missed_before[name] = self._missed
         facts.append(Changed(name, "new", source))
         sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
         return sensor
@@ -400,7 +400,7 @@ class Hub:
 
     def _forget(self, sensor: Sensor) -> None:
         """Give a sensor's place away. Should it return, its sequences and ids go on where they were."""
-        del self._sensors[sensor.name], self._told[sensor.name]
+        del self._sensors[sensor.name], self._missed_before[sensor.name]
         self._waits.pop(sensor.name, None)
         self.asks.pop(sensor.name, None)
         self.looks.pop(sensor.name, None)

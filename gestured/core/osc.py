@@ -31,10 +31,10 @@ _BUNDLE = b"#bundle\0"
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
-_PLACED = ("", "s", "r", "sr", "b", "sb")  # arguments that have a `Place`: scalars, a run, a blob that is not empty
+_SLOTTED = ("", "s", "r", "sr", "b", "sb")  # arguments that have a `Slot`: scalars, a run, a blob that is not empty
 LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
-PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
-SCALAR_BYTES = 48  # that Python takes for a scalar in a place
+SLOT_BYTES = 600  # that Python takes for a slot, its head, address, type tags and scalars not counted
+SCALAR_BYTES = 48  # that Python takes for a scalar in a slot
 # Where a packet's first head begins. In a bundle the message's size stands before it. A short head is in it whole.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
@@ -78,7 +78,7 @@ def timetags(rows: NDArray[np.uint8]) -> NDArray[np.float64]:
     return found
 
 
-class Place(NamedTuple):
+class Slot(NamedTuple):
     """Where one message stands in a packet of a known layout: scalars, then a run of numbers or a blob, or none."""
 
     start: int  # byte at which the head begins
@@ -100,10 +100,10 @@ class Place(NamedTuple):
 class Layout:
     """How a packet is laid out: its length in bytes, and its messages."""
 
-    __slots__ = ("length", "meaning", "places")
+    __slots__ = ("length", "meaning", "slots")
 
-    def __init__(self, length: int, places: list[Place]) -> None:
-        self.length, self.places = length, places
+    def __init__(self, length: int, slots: list[Slot]) -> None:
+        self.length, self.slots = length, slots
         self.meaning: Any = None  # what whoever reads such packets has found out about them
 
 
@@ -128,8 +128,8 @@ class Layouts:
         layout = self._known.get(begin) or self._known.get(_key(begin))
         if layout is None or layout.length != len(data):
             return None
-        for place in layout.places:
-            if not data.startswith(place[1], place[0]):
+        for slot in layout.slots:
+            if not data.startswith(slot[1], slot[0]):
                 return None
         return layout
 
@@ -140,7 +140,7 @@ class Layouts:
             return None
         time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
         messages: list[Message] = []
-        for _, _, address, types, unpack, scalars, dtype, length, run in layout.places:
+        for _, _, address, types, unpack, scalars, dtype, length, run in layout.slots:
             args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
             if dtype is not None:
                 args += (_frombuffer(data, dtype, length, run),)
@@ -151,17 +151,17 @@ class Layouts:
             messages.append(_new(Message, (address, types, args, time, bundle)))
         return messages
 
-    def remember(self, data: bytes, places: list[Place], bundled: bool) -> None:
-        """Remember the layout of a packet: messages in these places, and nothing else."""
+    def remember(self, data: bytes, slots: list[Slot], bundled: bool) -> None:
+        """Remember the layout of a packet: messages in these slots, and nothing else."""
         cost = 0
-        for place in places:
-            rest = place.length if place.dtype is not None else place.length > 0  # type tags of the run, or the blob
-            cost += PLACE_BYTES + 3 * len(place.head) + SCALAR_BYTES * (len(place.types) - rest)
+        for slot in slots:
+            rest = slot.length if slot.dtype is not None else slot.length > 0  # type tags of the run, or the blob
+            cost += SLOT_BYTES + 3 * len(slot.head) + SCALAR_BYTES * (len(slot.types) - rest)
         if cost > self._room:
             self._known.clear()
             self._room = self._most_bytes
         self._room -= cost
-        self._known[_key(data[BUNDLED if bundled else ALONE])] = Layout(len(data), places)
+        self._known[_key(data[BUNDLED if bundled else ALONE])] = Layout(len(data), slots)
 
 
 def _key(begin: bytes) -> bytes:
@@ -185,24 +185,24 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layo
     if layouts is not None and (known := layouts.read(data, bundled)) is not None:
         return known
     messages: list[Message] = []
-    places: list[Place] = []
+    slots: list[Slot] = []
     try:
         if len(data) > MAX_PACKET:
             raise ProtocolError("oversized", f"{len(data)} bytes, at most {MAX_PACKET}")
         if bundled:
-            _bundle(data, messages, places, errors)
+            _bundle(data, messages, slots, errors)
         else:
-            messages.append(_message(data, 0, 0, len(data), None, -1, places))
+            messages.append(_message(data, 0, 0, len(data), None, -1, slots))
     except ProtocolError as error:
         if errors is None:
             raise
         errors.append(error)
-    if layouts is not None and 0 < len(places) == len(messages) and not errors:  # strings, inner bundles have none
-        layouts.remember(data, places, bundled)
+    if layouts is not None and 0 < len(slots) == len(messages) and not errors:  # strings, inner bundles have none
+        layouts.remember(data, slots, bundled)
     return messages
 
 
-def _bundle(data: bytes, messages: list[Message], places: list[Place], errors: list[ProtocolError] | None) -> None:
+def _bundle(data: bytes, messages: list[Message], slots: list[Slot], errors: list[ProtocolError] | None) -> None:
     end = len(data)
     time = timetag(data, 8, end)
     number = bundles = seen = 0
@@ -224,15 +224,15 @@ def _bundle(data: bytes, messages: list[Message], places: list[Place], errors: l
             outer.append((end, time, number))
             bundles += 1
             end, time, number = at + size, timetag(data, at + 8, at + size), bundles
-            places.clear()
-            places = []  # such a packet is read anew each time
+            slots.clear()
+            slots = []  # such a packet is read anew each time
             at += 16
             continue
         seen += 1
         if seen > MAX_MESSAGES:
             raise ProtocolError("oversized", f"more than {MAX_MESSAGES} messages")
         try:
-            messages.append(_message(data, at - 4, at, at + size, time, number, places))
+            messages.append(_message(data, at - 4, at, at + size, time, number, slots))
         except ProtocolError as error:
             if errors is None:
                 raise
@@ -241,11 +241,11 @@ def _bundle(data: bytes, messages: list[Message], places: list[Place], errors: l
 
 
 def _message(
-    data: bytes, begin: int, start: int, end: int, time: float | None, bundle: int, places: list[Place]
+    data: bytes, begin: int, start: int, end: int, time: float | None, bundle: int, slots: list[Slot]
 ) -> Message:
     """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
 
-    Where it has only scalars and a run or a blob after them, its place is added to `places`.
+    Where it has only scalars and a run or a blob after them, its slot is added to `slots`.
     """
     address, types, at = _head(data, start, end)
     head = data[begin:at]
@@ -280,9 +280,9 @@ def _message(
         i = stop
     if at != end:
         raise ProtocolError("trailing", f"{end - at} bytes more than the type tags say")
-    if kinds in _PLACED:
+    if kinds in _SLOTTED:
         unpack = layout.unpack_from if "s" in kinds else None
-        places.append(Place(begin, head, address, types, unpack, scalars, dtype, count, run))
+        slots.append(Slot(begin, head, address, types, unpack, scalars, dtype, count, run))
     return Message(address, types, args, time, bundle)
 
 

@@ -13,7 +13,7 @@ class Owner:
     source: Source
     steady: bool = False  # it has sent more than one packet
     heard: float = 0.0  # s, monotonic: the last packet that was admitted
-    own: float | None = None  # s, the last packet of `source` itself
+    source_heard: float | None = None  # s, the last packet of `source` itself
     _ports: set[int] = field(default_factory=set)  # others of its host, each good for one packet
 
     def admits(self, source: Source, now: float, stale_s: float) -> bool:
@@ -24,11 +24,11 @@ class Owner:
         program's, and has to wait until the owner has been silent for `stale_s`, like anybody else.
         """
         if source == self.source:
-            self.steady = self.own is not None
-            self.own = self.heard = now
+            self.steady = self.source_heard is not None
+            self.source_heard = self.heard = now
             return True
-        if self.own is None or now - self.own > stale_s:
-            self.source, self.steady, self.own, self.heard = source, False, now, now
+        if self.source_heard is None or now - self.source_heard > stale_s:
+            self.source, self.steady, self.source_heard, self.heard = source, False, now, now
             self._ports.clear()
             return True
         if self.steady or source[0] != self.source[0] or source[1] in self._ports or len(self._ports) >= PORTS:

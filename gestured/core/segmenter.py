@@ -26,7 +26,7 @@ from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function
 from typing import NamedTuple
 
 from gestured.core.activity import hardly_ever, rarely
-from gestured.core.contact import ON_SHARE, Memory, Place, Stretch
+from gestured.core.contact import ON_SHARE, Centroid, Memory, Stretch
 from gestured.core.timing import Timing
 
 FAINT = 4.0  # times `on`: up to that activity something may lie on the sensor and be no gesture: the edge of an arm
@@ -97,7 +97,7 @@ def _released(memory: Memory) -> Signal:
 # --- what is remembered of a frame; each function may return a signal that follows from it
 
 
-def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+def _begin(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
     """The first contact of a segment begins."""
     memory.after.begin()
     memory.first = None
@@ -105,13 +105,13 @@ def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Si
     return _press(memory, t, activity, place)
 
 
-def _again(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+def _again(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
     """The second contact of a segment begins."""
     memory.first, memory.contact = memory.contact, Stretch(t)
     return _press(memory, t, activity, place)
 
 
-def _press(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+def _press(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
     """Remember a strong frame: its activity, and its centroid."""
     rose = _touch(memory, t, activity)
     if place is not None:
@@ -119,7 +119,7 @@ def _press(memory: Memory, t: float, activity: float, place: Place | None) -> Si
     return rose or _moved(memory)
 
 
-def _graze(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+def _graze(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
     """A frame that is pressed weakly."""
     return _touch(memory, t, activity) or _moved(memory)
 
@@ -143,13 +143,13 @@ def _moved(memory: Memory) -> Signal | None:
     return Signal.MOVED if memory.first is not None and not memory.tap_so_far() else None
 
 
-def _quiet(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+def _quiet(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
     """The first quiet frame is the one from which the waits count."""
     if memory.quiet_since is None:
         memory.quiet_since = t
 
 
-def _lie(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+def _lie(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
     """What was given up still lies there."""
     memory.quiet_since = None
     memory.contact.touched = t
@@ -159,7 +159,7 @@ def _lie(memory: Memory, t: float, activity: float, place: Place | None) -> None
         memory.rests = Stretch(t)  # a finger that goes on moving does not lie there
 
 
-def _part(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+def _part(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
     """The second contact is a segment of its own."""
     memory.first = None
 
@@ -197,7 +197,7 @@ class Row(NamedTuple):
 
     then: Phase
     action: Action | None = None
-    remember: Callable[[Memory, float, float, Place | None], Signal | None] | None = None
+    remember: Callable[[Memory, float, float, Centroid | None], Signal | None] | None = None
 
 
 S, A = Signal, Action
@@ -278,8 +278,8 @@ class Segmenter:
         """Activity from which a frame at `t` s is strong, and below which it is quiet; noise units."""
         return self.phase.levels(self._memory, t)
 
-    def push(self, t: float, activity: float, place: Place | None) -> list[Deed]:
-        """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
+    def push(self, t: float, activity: float, place: Centroid | None) -> list[Deed]:
+        """One frame at `t` s, after `wait(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
         if activity < self.off and self.phase is IDLE:
             return []  # what the first row of the table says, without looking it up
         return self._step(self.phase.reads(self._memory, t, activity), t, activity, place)
@@ -290,7 +290,7 @@ class Segmenter:
         wait, since = self.phase.wait, self._memory.quiet_since
         return since + float(getattr(self._memory.timing, wait)) if wait and since is not None else None
 
-    def flush(self, t: float, sure: float) -> list[Deed]:
+    def wait(self, t: float, sure: float) -> list[Deed]:
         """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over.
 
         A wait that was over while everything was known, until `sure` (s), is decided at its end; another one at `t`.
@@ -307,7 +307,9 @@ class Segmenter:
         """End the contact at `t` s as if `limit_s` were over: it has too many frames, or another clock says so."""
         return self._step(Signal.LIMIT, t) if self.phase.pending else []
 
-    def _step(self, signal: Signal | None, t: float, activity: float = 0.0, place: Place | None = None) -> list[Deed]:
+    def _step(
+        self, signal: Signal | None, t: float, activity: float = 0.0, place: Centroid | None = None
+    ) -> list[Deed]:
         deeds: list[Deed] = []
         while signal is not None:
             then, action, remember = TRANSITIONS[self.phase, signal]

@@ -67,7 +67,7 @@ class Sensor:
         # Whether looks for provisional events wait until `look`; and where nobody asks for these, the model's runs for
         # answers until `ask`, or until the answer is due.
         self._later = False
-        self.habits, self.vitals = Habits(*self.front_end.sent), Vitals()
+        self.habits, self.vitals = Habits(*self.front_end.grid_sent), Vitals()
         self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
         self._fresh = True  # no frame was used since it came or restarted
         self._open: int | None = None  # id of the contact that was not released yet
@@ -292,7 +292,7 @@ class Sensor:
             self._recover(error, self.stamper.at(now), facts)
 
     def receive(self, arrivals: Sequence[Arrival], now: float, facts: list[Fact], *, missed: bool = False) -> float:
-        """Take frames that were found waiting at `now`; gives `arrives` as it is then.
+        """Take frames that were found waiting at `now`; gives `elapses_at` as it is then.
 
         `missed`: this machine may have had no room for others.
         """
@@ -301,7 +301,7 @@ class Sensor:
             self.vitals.arrived(now, len(arrivals), missed=missed)
         except Exception as error:
             self._recover(error, self.stamper.at(now), facts)
-            return self.arrives
+            return self.elapses_at
         taken = lost = duplicates = late = implausible = 0
         for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:
@@ -330,10 +330,10 @@ class Sensor:
         if lost:
             self._lost, self._lost_at = self._lost + lost, now
         facts.append(_new(Arrived, ((self.name,), taken, lost, duplicates, late, implausible)))
-        return math.inf if self._open is None else self.arrives
+        return math.inf if self._open is None else self.elapses_at
 
     @property
-    def arrives(self) -> float:
+    def elapses_at(self) -> float:
         """When `elapse` will find something unless a frame comes before; infinite where nothing waits."""
         due = None if self._open is None else self.due  # nothing waits where there is no contact
         return math.inf if due is None else self.stamper.when(due)
@@ -359,10 +359,10 @@ class Sensor:
         before, self._scene = self._scene, scene
         old, new = self.front_end, _front_end(self.name, scene)
         another_clock = scene.clock_of(self.name) != before.clock_of(self.name)
-        alike = (old.sent, old.mounting, old.timing) == (new.sent, new.mounting, new.timing)
+        alike = (old.grid_sent, old.mounting, old.timing) == (new.grid_sent, new.mounting, new.timing)
         if another_clock or not alike or scene.waits_for_double_tap != before.waits_for_double_tap:
             self.run(Sensor.reset, now, facts)
-            self.front_end, self.habits = new, Habits(*new.sent)
+            self.front_end, self.habits = new, Habits(*new.grid_sent)
             self._square = new.rows == new.columns
         if another_clock:
             self.stamper = Stamper(scene.clock_of(self.name))

@@ -17,7 +17,7 @@ from gestured.core import osc
 from gestured.core.address import NAME_LETTERS, is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.frames import Touch
-from gestured.core.osc import Argument, Layout, Layouts, Message, Place
+from gestured.core.osc import Argument, Layout, Layouts, Message, Slot
 
 MAX_TOUCHES = 3
 # How the values of a blob are encoded, by its bytes for each taxel; a blob of any other size is refused.
@@ -119,7 +119,7 @@ class _Meaning(NamedTuple):
     """Of packets of one layout that hold one frame, and beside it nothing that is wanted."""
 
     route: _Route
-    place: Place  # of the frame's message
+    slot: Slot  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
     form: int  # the same for packets whose frames stand in the same place, of the same type and grid
 
@@ -193,21 +193,21 @@ class Decoder:
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """What packets of a layout hold; False where each of them has to be read by itself."""
-        routes = [self._routes.get((place.address, place.types)) for place in layout.places]
-        frames = [(r, p) for r, p in zip(routes, layout.places, strict=True) if r is not None and r.grid is not None]
+        routes = [self._routes.get((slot.address, slot.types)) for slot in layout.slots]
+        frames = [(r, p) for r, p in zip(routes, layout.slots, strict=True) if r is not None and r.grid is not None]
         known = all(route is not None and route.fault is None for route in routes)
         if self._keep_touches or not known or len(frames) != 1:
             return False
-        route, place = frames[0]
+        route, slot = frames[0]
         rows, columns = route.grid or (0, 0)
-        dtype = place.dtype if place.dtype is not None else _BLOBS.get(place.length / (rows * columns))
-        if dtype is None or any(other.blob for other in layout.places if other is not place):
+        dtype = slot.dtype if slot.dtype is not None else _BLOBS.get(slot.length / (rows * columns))
+        if dtype is None or any(other.blob for other in layout.slots if other is not slot):
             return False
-        bundled = place.start > 0  # a short name in a bundle's packet is as long as a long one by itself
-        form = layout.length, bundled, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
+        bundled = slot.start > 0  # a short name in a bundle's packet is as long as a long one by itself
+        form = layout.length, bundled, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        return _Meaning(route, place, dtype, self._forms.setdefault(form, next(self._numbers)))
+        return _Meaning(route, slot, dtype, self._forms.setdefault(form, next(self._numbers)))
 
     def _learn(self, address: str, types: str) -> _Route:
         if len(self._routes) >= _MAX_ROUTES:
@@ -297,20 +297,20 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
     """The finite frames of packets whose `form` is the same."""
-    _, (route, place, dtype, _) = members[0]
+    _, (route, slot, dtype, _) = members[0]
     assert route.grid is not None
-    taxels, end = math.prod(route.grid), place.run + (place.length if place.blob else place.length * dtype.itemsize)
+    taxels, end = math.prod(route.grid), slot.run + (slot.length if slot.blob else slot.length * dtype.itemsize)
     block = np.frombuffer(b"".join([packets[i] for i, _ in members]), np.uint8).reshape(len(members), -1)
-    raw = block[:, place.run : end].view(dtype)
+    raw = block[:, slot.run : end].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
     good = np.isfinite(values).all(axis=1)
     counters = tags = None
-    if place.blob:
-        good &= block[:, place.run - 4 : place.run].view(">u4")[:, 0] == place.length
+    if slot.blob:
+        good &= block[:, slot.run - 4 : slot.run].view(">u4")[:, 0] == slot.length
     if route.counted:
-        first = raw if place.unpack is None else block[:, place.scalars : place.scalars + 4].view(">i4")
+        first = raw if slot.unpack is None else block[:, slot.scalars : slot.scalars + 4].view(">i4")
         counters = first[:, 0].astype(np.int64)
-    if place.start:  # alone, a message begins at 0
+    if slot.start:  # alone, a message begins at 0
         tags = osc.timetags(block[:, 8:16])
     found = Block(
         [i for i, _ in members], [meaning.route.sensor for _, meaning in members],

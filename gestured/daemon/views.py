@@ -27,7 +27,7 @@ UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, 
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Viewer:
     """What one connection looks at."""
 
     sensors: frozenset[str]
@@ -44,7 +44,7 @@ class Views:
     def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
         """`state` gives the daemon's state; `changed` is called when other sensors are looked at than before."""
         self._hub, self._state, self._changed = hub, state, changed
-        self._looks: dict[Connection, Look] = {}
+        self._looks: dict[Connection, Viewer] = {}
         self._due: set[str] = set()  # sensors that are looked at and have sent frames since
         self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
         self._state_due = False
@@ -59,7 +59,7 @@ class Views:
     def follow(self, connection: Connection, sensors: Collection[str], *, raw: bool) -> None:
         """Stream to a connection: the state and the views of sensors as they are now, and then what is new."""
         connection.streams, connection.flush = True, self._tell_events
-        self._looks[connection] = Look(frozenset(sensors), raw)
+        self._looks[connection] = Viewer(frozenset(sensors), raw)
         self._forget_gone()
         self._changed()
         self._state_due = True

@@ -48,7 +48,7 @@ class Embedded:
     def __init__(self, sensor: Sensor, gestures: tuple[str, ...]) -> None:
         self.gestures = gestures  # in use, in the model's order
         self._sensor = sensor
-        self._shape = sensor.front_end.sent
+        self._shape = sensor.front_end.grid_sent
         self._last = -math.inf  # s, the time of the last frame
         self._closed: set[str] = set()  # gates
 

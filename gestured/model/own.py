@@ -16,7 +16,7 @@ from gestured.model.prototypes import Array, Prototype, Space, clashes, nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bank:
+class PrototypeSet:
     """The prototypes of one model."""
 
     space: Space
@@ -51,7 +51,7 @@ class Own:
         self.gestures = {name: examples for name, examples in gestures.items() if name not in known}
         self.hidden = tuple(name for name in gestures if name in known)
         self.missing: Callable[[Model], None] = self.make  # called while a model answers that has no prototypes yet
-        self._banks: WeakKeyDictionary[Model, Bank | None] = WeakKeyDictionary()
+        self._banks: WeakKeyDictionary[Model, PrototypeSet | None] = WeakKeyDictionary()
 
     def match(self, model: Model, segment: Segment) -> Match | None:
         """The own gesture that is nearest to a segment; None where the model has no embedding, or fails to give one."""
@@ -70,7 +70,7 @@ class Own:
 
     def make(self, model: Model) -> None:
         """Make the prototypes of a model; any thread may. It takes up to a second for each model and list."""
-        bank: Bank | None = None
+        bank: PrototypeSet | None = None
         if model.space is not None:
             try:
                 bank = self._made(model, model.space)
@@ -78,16 +78,16 @@ class Own:
                 pass  # a model that fails has no prototypes
         self._banks[model] = bank
 
-    def made(self, model: Model) -> Bank | None:
+    def made(self, model: Model) -> PrototypeSet | None:
         """The prototypes of a model, where they are made; any thread may look."""
         return self._banks.get(model)
 
-    def _bank(self, model: Model) -> Bank | None:
+    def _bank(self, model: Model) -> PrototypeSet | None:
         if model.space is not None and self.gestures and model not in self._banks:
             self.missing(model)
         return self._banks.get(model)
 
-    def _made(self, model: Model, space: Space) -> Bank:
+    def _made(self, model: Model, space: Space) -> PrototypeSet:
         looked = {name: [placed(model, space, one) for one in examples] for name, examples in self.gestures.items()}
         places = {name: np.stack([one.place for one in found]) for name, found in looked.items()}
         prototypes = {name: Prototype.of(space, found) for name, found in places.items()}
@@ -95,7 +95,7 @@ class Own:
         for name, found in looked.items():
             taken = {one.taken[0] for one in found if one.taken}
             doubtful += sorted(f"{name} may be taken for the model's {gesture}" for gesture in taken)
-        return Bank(space, prototypes, tuple(doubtful))
+        return PrototypeSet(space, prototypes, tuple(doubtful))
 
 
 def placed(model: Model, space: Space, example: Example) -> Placed:

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from gestured.core.contact import Place
+from gestured.core.contact import Centroid
 from gestured.core.cutter import Sight, clear
 
 STEP_S = 1 / 15
 TRAVEL = 1.35  # taxel pitches, of a sensor of 9 x 9
 
-Path = Callable[[float], Place]  # s -> where the finger is
+Path = Callable[[float], Centroid]  # s -> where the finger is
 
 speeds = st.floats(8.0, 40.0)  # taxel pitches a second: from frame to frame, a way that has a direction
 headings = st.floats(-math.pi, math.pi)

@@ -38,7 +38,7 @@ def deeds(stream: Stream, wait: bool = True, sure_s: float = 0.0) -> list[Deed]:
     t, said = 0.0, list[Deed]()
     for pause, activity, place in stream:
         sure, t = t + sure_s, t + pause
-        said += segmenter.flush(t, sure)
+        said += segmenter.wait(t, sure)
         said += segmenter.push(t, activity, place if activity >= segmenter.off else None)
     return said
 
@@ -113,7 +113,7 @@ def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         play(stream)
     waiting = Segmenter(81, 0.15 * 9)
     for n, activity in enumerate([50.0] * 3 + [0.0] * 3):
-        waiting.flush(n / 15, 0.0)
+        waiting.wait(n / 15, 0.0)
         waiting.push(n / 15, activity, (4.0, 4.0))
     assert [deed.action for deed in waiting.give_up(0.4)] == [
         Action.HELD

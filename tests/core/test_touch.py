@@ -46,7 +46,7 @@ class Hand:
 
     def __init__(self, subject: Sensor, rate_hz: float = 15.0, unit: float = 1.0) -> None:
         self.subject, self.rate_hz, self.unit, self.t = subject, rate_hz, unit, 0.0
-        self.grid, self.width = subject.front_end.sent, 0.8  # of a finger, in pitches
+        self.grid, self.width = subject.front_end.grid_sent, 0.8  # of a finger, in pitches
         self._random = np.random.default_rng(0)
         self.told: list[Event] = []
         self.rests(2.0)

@@ -51,7 +51,7 @@ class Habits:
 
     def see(self, front_end: FrontEnd) -> None:
         """See the last frame that a front end has taken. Where R equals C, only `Look.burst` says something."""
-        shown, look = front_end.shown, front_end.look
+        shown, look = front_end.last_sent, front_end.look
         if shown is None or look is None:
             return
         if look.burst and (fallen := front_end.conditioner.fallen(look)) >= front_end.segmenter.on:

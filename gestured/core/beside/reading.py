@@ -152,7 +152,7 @@ class View:
 
 def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
     """A sensor's view now; None before its first frame."""
-    shown, look, t = front_end.shown, front_end.look, front_end.pace.last
+    shown, look, t = front_end.last_sent, front_end.look, front_end.pace.last
     if shown is None or t is None:
         return None
     phase, (on, off) = front_end.levels(t)
