@@ -202,6 +202,10 @@ class Bank:
         frames = np.bincount(rows[mine], minlength=len(self._known))
         if not self._by_tag:
             mine &= frames[rows] == 1  # several share their time
+        elif block.tags is not None and (several := (mine & (frames[rows] > 1)).nonzero()[0]).size:
+            of = np.column_stack((rows[several], block.tags[several]))
+            of = of[np.lexsort(of.T)]
+            mine &= ~np.isin(rows, of[1:][(of[1:] == of[:-1]).all(axis=1), 0])  # the same, where a clock is coarse
         left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
         while len(left) >= FEW:
             first.fill(-1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gestured.core import bank
 from gestured.core.bank import FEW, Bank
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.hub import Hub
@@ -133,6 +134,24 @@ def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
     said, known = play(arrived, together=True)
     assert repr((said, known)) == repr(play(arrived, together=False))
     assert sum("bad_taxels=1" in str(one) for one in known) > 10
+
+
+def test_frames_of_one_time_are_spaced_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that shows tenths of seconds has one time for several frames, which may be read at once."""
+    known = list[object]()
+    for few in (FEW, 10**6):  # with banks, and without
+        monkeypatch.setattr(bank, "FEW", few)
+        hub, rng = Hub(SCENE, Sure()), np.random.default_rng(0)
+        for k in range(0, 90, 3):
+            packets = [
+                encoding.bundle([encoding.message(f"/clock{n}/pressure", "f" * 81, one)], 1.7e9 + (k + j) // 3 / 5)
+                for j in range(3)
+                for n, one in enumerate(rng.normal(100.0, 2.0, (EACH, 81)).tolist())
+            ]
+            hub.receive([(packet, SOURCE) for packet in packets], 1 + k / 15)
+        hub.tick(1 + k / 15)
+        known.append([hub.readings(1 + k / 15)[f"clock{n}"].interval_s for n in range(EACH)])
+    assert known[0] == known[1] == pytest.approx([1 / 15] * EACH)
 
 
 @pytest.mark.parametrize("rate_hz", [0.4, 2.0, 3.3, 1000.0])
