@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gestured.core.classifier import Match, Scores
@@ -325,11 +325,22 @@ def oracle(segment: Segment, salt: bytes = b"") -> Scores:
 
 
 @dataclass
+class Dawdling(Clock):
+    """A run is measured as late as it was, but no other time passes: else previews would bring rungs back sooner."""
+
+    late: float = 0.0  # s, of the next reading alone
+
+    def __call__(self) -> float:
+        now, self.late = super().__call__() + self.late, 0.0
+        return now
+
+
+@dataclass
 class Rung(Model):
     """Fails or dawdles with some segments, by what they hold."""
 
     name: str
-    clock: Clock
+    clock: Dawdling
     certainty: Certainty | None
     gestures: tuple[str, ...] = GESTURES
     rows: int = 9
@@ -340,7 +351,7 @@ class Rung(Model):
         mood = int(scores.values[0] * 1e6) % 8
         if mood == 0:
             raise RuntimeError("broken")
-        self.clock.now += 0.2 if mood % 2 else 0.0
+        self.clock.late = 0.2 if mood % 2 else 0.0
         values = np.full(4, np.nan, np.float32) if mood == 2 else scores.values
         return Scores(values, scores.unknown, self.name, threshold=0.4)
 
@@ -364,6 +375,8 @@ def answers_of(
     for n, frame in enumerate(stream):
         clock.now = 10 * frame.t  # so fast that rungs which were put aside come back within a stream
         events += events_of(subject.push(frame))
+        if isinstance(classifier, Ladder):
+            subject.ask()  # as a loop that has time: each run of a rung counts, also of an answer that never comes due
         if looks and looks[n % len(looks)]:
             events += events_of(subject.look())
     return events + events_of(subject.flush(stream[-1].t + 0.2))
@@ -383,7 +396,7 @@ def an_oracle() -> tuple[Any, Clock]:
 
 
 def a_ladder() -> tuple[Any, Clock]:
-    clock = Clock()
+    clock = Dawdling()
     rungs = [Rung("best", clock, EAGER), Rung("second", clock, None), Rung("third", clock, EAGER)]
     return Ladder(rungs, clock=clock), clock
 
@@ -395,6 +408,7 @@ def a_ladder() -> tuple[Any, Clock]:
     st.lists(STEPS, min_size=2, max_size=12),
     st.lists(st.booleans(), max_size=9),
 )
+@example("15", [TAP, "press 4,4 0.8 for 1 frame", SHORT, TAP], [False])  # "best" fails at what may be the first tap
 def test_answers_are_the_same_whether_or_not_anybody_asks(
     make: Callable[[], tuple[Any, Clock]], rate: str, steps: list[str], looks: list[bool]
 ) -> None:
@@ -416,7 +430,7 @@ def test_the_property_above_sees_provisional_events_and_all_rungs() -> None:
 
 
 def test_a_ladder_that_is_asked_early_keeps_its_books() -> None:
-    clock, said = Clock(), []
+    clock, said = Dawdling(), []
     ladder = Ladder([Rung("best", clock, CERTAINTY), Rung("second", clock, None)], clock=clock, report=said.append)
     assert ladder.certainty is CERTAINTY
     stream = frames(IDLE, *[SWIPE, PAUSE] * 20)
@@ -428,7 +442,7 @@ def test_a_ladder_that_is_asked_early_keeps_its_books() -> None:
 
 
 def test_a_ladder_that_is_slow_is_not_asked_early_for_a_while() -> None:
-    clock, calls = Clock(), []
+    clock, calls = Dawdling(), []
 
     class Slow(Rung):
         def classify(self, segment: Segment) -> Scores:
