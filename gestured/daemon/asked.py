@@ -1,8 +1,11 @@
 """What a configuration asks for: its models, opened; its destinations; its scene."""
 
 import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.own import is_name
@@ -25,6 +28,14 @@ from gestured.model.ladder import (
 SLIP = 0.8  # of difflib's ratio: a name so near to a gesture of the model is taken for a slip of it
 
 
+class Output(NamedTuple):
+    """A destination that the settings name, not opened yet."""
+
+    where: str  # as the settings name it
+    tells: str  # what is sent there, in words
+    open: Callable[[Metrics], UdpOut]
+
+
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What a configuration asks for, opened and not yet used."""
@@ -38,13 +49,19 @@ class Asked:
 def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
     """Open what may take long: models, and names of hosts. Raises as `open_ladder`."""
     ladder = open_ladder(settings, insist=insist)
-    outputs: list[UdpOut] = [
-        TuioSink(one.address, metrics)
-        if one.scheme == TUIO
-        else OscSink(one.address, metrics, provisional=settings.publish_provisional)
-        for one in settings.publish
-    ]
+    outputs = [output.open(metrics) for output in outputs_of(settings)]
     return Asked(settings, ladder, outputs, own_file.where(settings.own_gestures, os.environ))
+
+
+def outputs_of(settings: Settings) -> Iterator[Output]:
+    """Where events go besides the sockets: a daemon opens these, and `--explain` names them."""
+    early = settings.publish_provisional
+    osc = f"gestures{' and provisional events' if early else ''}, and the status once a second"
+    for one in settings.publish:
+        if one.scheme == TUIO:
+            yield Output(str(one), "fingers while they touch", partial(TuioSink, one.address))
+        else:
+            yield Output(str(one), osc, partial(OscSink, one.address, provisional=early))
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:

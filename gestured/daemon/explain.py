@@ -8,13 +8,12 @@ from gestured.client.address import control_beside, default_socket
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
-from gestured.daemon.asked import open_ladder
+from gestured.daemon.asked import open_ladder, outputs_of
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
-from gestured.daemon.tuio import TUIO
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use
 
@@ -93,14 +92,13 @@ def _input(settings: Settings, ladder: Ladder) -> Said:
 def _output(settings: Settings, ladder: Ladder) -> Said:
     path = settings.socket or default_socket(os.environ)
     yield OUTPUT, f"unix {path}, mode 0660, {CLIENTS} clients, {BACKLOG_BYTES >> 10} KiB waiting each"
-    what = "gestures and provisional events" if settings.publish_provisional else "gestures"
-    for one in settings.publish:
-        told = "fingers while they touch" if one.scheme == TUIO else f"{what}, and the status once a second"
-        yield OUTPUT, f"{one}: {told}"
+    outputs = [*outputs_of(settings)]
+    for one in outputs:
+        yield OUTPUT, f"{one.where}: {one.tells}"
     yield OUTPUT, f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group"
     if settings.gates is not None:
         yield OUTPUT, f"gates: unix {settings.gates}, mode 0660, for bridges"
-    if settings.publish:
+    if outputs:
         yield LOADS, "python-osc, which writes what is published"
     else:
         yield LEAVES, "python-osc, OSC output: no --publish"
