@@ -73,6 +73,17 @@ def test_a_place_that_is_none_is_named():
         assert words is not None and words.startswith("where {") and "expected an object with start" in words
 
 
+@pytest.mark.parametrize("kind", ["hello", "status"])
+@pytest.mark.parametrize(
+    "wrong", [{"closed": 5}, {"closed": [None]}, {"armed": "yes"}, {"until": "soon"}, {"until": 1e11}]
+)
+def test_what_is_said_of_a_sensors_gates_is_looked_at(kind, wrong):
+    line = next(line for line in LINES if line["type"] == kind)
+    told = {"armed": None, "closed": ["door"], "until": None}
+    assert wrong_field(line | {"gates": {"a": told}}) is None
+    assert (wrong_field(line | {"gates": {"a": told | wrong}}) or "").startswith("gates {")
+
+
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: type(event).__name__)
 def test_an_event_belongs_to_all_that_it_is_told_and_none_of_them_can_change_it(event):
     for one in fields(event):

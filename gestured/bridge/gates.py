@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gestured.bridge.counts import Counts
 from gestured.client.control import Control
+from gestured.client.lines import Refused
 from gestured.core.errors import GesturedError
 
 ON, OFF = "ON", "OFF"  # commands: a sensor shall listen, as far as this gate goes, or be silent
@@ -39,7 +40,10 @@ class Gate:
                 else:
                     answer = control.ask("allow", **which)
                 self._obeyed = True
-                closed: list[str] = answer["sensors"][sensor]
+                closed = answer.get("sensors")
+                closed = closed.get(sensor) if isinstance(closed, dict) else None
+                if not isinstance(closed, list) or not all(isinstance(name, str) for name in closed):
+                    raise Refused(f"{self._path} does not say which gates are closed: it is not the daemon's --gates")
                 return closed
         except GesturedError as error:
             self._counts.add("commands", "failed")

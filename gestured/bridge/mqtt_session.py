@@ -51,6 +51,7 @@ class Mqtt:
         gate = None if self._gate is None else self._gate.name
         self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
         self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
+        self._obeying = threading.Lock()  # held while a command is put there, or taken from there
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # a signal handler may put into it
         self._stopping = False
         self._client: Any = None  # of this connection, from the call on; None while there is none
@@ -178,12 +179,14 @@ class Mqtt:
         if message.retain or command not in (ON, OFF) or sensor not in self._daemon.states:
             self._counts.add("commands", "retained" if message.retain else "wrong")
             return
-        waits, self._commands[sensor] = sensor in self._commands, command
+        with self._obeying:
+            waits, self._commands[sensor] = sensor in self._commands, command
         if not waits:
             self._inbox.put(partial(self._obey, sensor))
 
     def _obey(self, sensor: str) -> None:
-        command = self._commands.pop(sensor)
+        with self._obeying:
+            command = self._commands.pop(sensor)
         if self._gate is None:
             return
         try:

@@ -36,6 +36,16 @@ def _is_where(value: Any) -> bool:
     return isinstance(value, dict) and all(_KINDS[kind][0](value.get(name)) for name, kind in _WHERE.items())
 
 
+def _is_gates(value: Any) -> bool:
+    """What is said of a sensor that a gate silences, or that a gesture arms; see `messages.listening`."""
+    if not isinstance(value, dict) or not _is_texts(value.get("closed", [])):
+        return False
+    until = value.get("until")
+    return type(value.get("armed")) in (bool, type(None)) and (
+        until is None or (_is_number(until) and abs(until) < LONGEST_S)
+    )
+
+
 _WHERE = get_type_hints(Where)
 GATES = Mapping[str, Mapping[str, Any]]
 # How a field is annotated -> whether a value is one, and what it is called.
@@ -53,7 +63,7 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     tuple[str, ...]: (_is_texts, "a list of texts"),
     Mapping[str, float]: (_object(_is_number), "an object of numbers"),
     Mapping[str, str]: (_object(_is(str)), "an object of texts"),
-    GATES: (_object(_is(dict)), "an object of objects"),
+    GATES: (_object(_is_gates), "an object of objects with armed, closed and until"),
     Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
 }
 _EVENTS = {event.__name__.lower(): event for event in get_args(Event)}

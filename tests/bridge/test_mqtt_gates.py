@@ -1,5 +1,9 @@
 """A gate that a real broker closes and opens, of a real daemon, through the bridge."""
 
+import json
+import socket
+import threading
+from argparse import Namespace
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -8,7 +12,9 @@ import pytest
 
 from gestured.bridge.counts import Counts
 from gestured.bridge.gates import OFF, ON, Gate
+from gestured.bridge.mqtt_session import Mqtt
 from gestured.client.control import Control
+from gestured.client.lines import Refused
 from tests.bridge.conftest import Broker, Process, guarded, page, wait
 from tests.daemon.harness import Client, Daemon, Sensor
 
@@ -147,6 +153,57 @@ def test_a_status_that_was_on_its_way_closes_no_gate_that_the_bus_has_opened(gat
     gate.repeat(["armrest"])  # the daemon had written its status before
     with Control(Path(gated.ready["control"])) as operator:
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
+
+
+@pytest.mark.parametrize(
+    "answer", [{}, {"sensors": []}, {"sensors": {}}, {"sensors": {"armrest": 5}}, {"sensors": {"armrest": [5]}}]
+)
+def test_an_answer_of_a_mad_daemon_is_a_command_that_failed(tmp_path: Path, answer: dict[str, Any]) -> None:
+    path = tmp_path / "gates.sock"
+    with socket.create_server(str(path), family=socket.AF_UNIX) as server:
+
+        def serve() -> None:
+            with server.accept()[0] as connection:
+                connection.recv(4096)
+                connection.sendall(json.dumps({"ok": True, **answer}).encode() + b"\n")
+
+        threading.Thread(target=serve).start()
+        with pytest.raises(Refused, match="does not say which gates are closed"):
+            Gate(path, "mqtt", Counts("mqtt")).obey("armrest", OFF)
+
+
+def test_a_command_that_comes_while_another_is_taken_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The broker's thread looks whether one waits, just as the bridge takes that one."""
+    monkeypatch.setenv("MQTT_USER", "car")
+    args = Namespace(
+        host="car", broker="127.0.0.1", tls=False, ca=None, cert=None, sensors=None, gestures=None, gates=Path("none"),
+        gate="mqtt", discovery="homeassistant", no_discovery=True,
+    )  # fmt: skip
+    session, obeyed = Mqtt(args, Counts("mqtt")), list[str]()
+
+    class Commands(dict[str, str]):
+        def __contains__(self, sensor: object) -> bool:
+            found = super().__contains__(sensor)
+            if found and not obeyed:
+                taker.start()
+                taker.join(0.2)  # it would be done by now
+            return found
+
+    def obey(sensor: str, command: str) -> list[str]:
+        obeyed.append(command)
+        return []
+
+    session._daemon.states, session._commands = {"armrest": "ok"}, Commands()
+    taker = threading.Thread(target=lambda: session._serve(0.0))
+    assert session._gate is not None
+    session._gate.obey = obey  # type: ignore[method-assign]
+    for command in (OFF, ON):
+        session._hear(Namespace(topic=SET, payload=command.encode(), retain=False))
+    taker.join()
+    session._serve(0.0)
+    session._hear(Namespace(topic=SET, payload=OFF.encode(), retain=False))
+    session._serve(0.0)
+    assert obeyed in ([ON, OFF], [OFF, ON, OFF])
 
 
 def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, house, tmp_path: Path) -> None:
