@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from tests.daemon import tiny_model
 from tests.daemon.harness import Hand
+from tests.scenario import frames
 from tests.small_model import build, operating_points
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,6 +76,9 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"thresholds": 0.5}, "thresholds: expected a confidence for each name, .*found 0.5"),
         ({"strictness": "lax"}, "strictness: expected eager or normal or strict, found 'lax'"),
         ({"strictness": None}, "strictness: expected eager or normal or strict, found None"),
+        ({"sensor": 5}, "sensor: expected 1 to 64 of .* found 5"),
+        ({"zones": [("seat", (0, 0, 1, 1))]}, "zones: expected four numbers for each name, found .*seat"),
+        ({"arming": {"by": "one_tap", "seconds": 10**400}}, "too large"),
         ({"own_gestures": "none.json"}, r"none\.json: cannot be read: No such file"),
     ],
 )
@@ -87,6 +92,8 @@ def test_a_mistake_in_opening_is_one_sentence(shelf: Path, wrong: dict[str, Any]
     [
         (1.0, np.zeros((9, 9)), r"after the last frame's, 1\.0 s, found 1\.0"),
         (0.5, np.zeros((9, 9)), r"found 0\.5"),
+        (10**400, np.zeros((9, 9)), "found 1000"),
+        ("2", np.zeros((9, 9)), "found 2"),
         (float("nan"), np.zeros((9, 9)), "found nan"),
         (2.0, np.zeros((9, 8)), r"grid \(9, 9\) .* shape \(9, 8\)"),
         (2.0, np.zeros(81), r"shape \(81,\)"),
@@ -100,6 +107,18 @@ def test_a_mistake_in_pushing_is_one_sentence_and_loses_nothing(recognizer: Any,
     with pytest.raises(ValueError, match=words):
         recognizer.push(t, values)
     assert recognizer.push(1.1, np.zeros((9, 9), np.uint16)) == []
+
+
+def test_numbers_of_any_kind_are_times(shelf: Path):
+    """A gap is added to times, and times to each other: what is no float is made one at the door."""
+    stream = frames("quiet for 1500ms", "press 4,4 0.8 for 130ms", "quiet for 900ms")
+    said: list[list[Any]] = []
+    for kind in (float, Decimal, np.float64):
+        recognizer = gestured.open("cnn_lstm", tap_gap_s=kind("0.4"))
+        said.append([event for frame in stream for event in recognizer.push(kind(frame.t), frame.values)])
+        said[-1] += recognizer.flush(kind(stream[-1].t + 1))
+        assert recognizer.push(kind(100), stream[0].values) == []
+    assert len(said[0]) >= 3 and said[0] == said[1] == said[2]
 
 
 def test_time_goes_on_across_flush_and_reset(recognizer: Any):

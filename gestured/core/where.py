@@ -52,6 +52,8 @@ def zones_of(told: Mapping[str, Any]) -> dict[str, Zone]:
 
     Raises ValueError, which names the zone, or both where two overlap.
     """
+    if not isinstance(told, Mapping):
+        raise ValueError(f"zones: expected four numbers for each name, found {told!r}")
     if len(told) > MOST_ZONES:
         raise ValueError(f"zones: expected at most {MOST_ZONES} of a sensor, found {len(told)}")
     zones: dict[str, Zone] = {}

@@ -59,7 +59,8 @@ class Embedded:
         A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a time
         that is not after the last frame's, `values` that are no frame of this sensor's grid, a `lost` that is no count.
         """
-        if not self._last < t < math.inf:
+        seconds = _seconds(t)
+        if not self._last < seconds < math.inf:
             after = f"a time after the last frame's, {self._last} s" if self._last > -math.inf else "seconds"
             raise ValueError(f"t: expected {after}, found {t}")
         frame = _counts(values)
@@ -67,10 +68,10 @@ class Embedded:
             raise ValueError(f"values: expected the grid {self._shape} of this sensor, found the shape {frame.shape}")
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
-        self._last = t
+        self._last = seconds
         if not np.all(np.abs(frame) <= LARGEST):  # written so that NaN fails it, too
             return []
-        return events_of(self._sensor.push(Frame(t, frame, tuple(touches), lost)))
+        return events_of(self._sensor.push(Frame(seconds, frame, tuple(touches), lost)))
 
     @property
     def due(self) -> float | None:
@@ -114,9 +115,10 @@ class Embedded:
         return events_of(told)
 
     def _now(self, t: float) -> float:
-        if not self._last <= t < math.inf:
+        seconds = _seconds(t)
+        if not self._last <= seconds < math.inf:
             raise ValueError(f"t: expected a time not before the last frame's, {self._last} s, found {t}")
-        return t
+        return seconds
 
 
 def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
@@ -154,7 +156,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
     OwnFileError for another mistake.
     """
-    if not is_sensor(sensor):
+    if not isinstance(sensor, str) or not is_sensor(sensor):
         raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
     used = gestures_in_use(ladder, gestures)
@@ -169,13 +171,13 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             gestures=used,
             grid=(rows, columns),
             sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert), zones=zones_of(zones or {}))},
-            tap_gap_s=tap_gap_s,
+            tap_gap_s=float(tap_gap_s),
             touch=touch,
             strictness=strictness,
             arming=Arming.of(arming),
             thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
         )
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SettingsError(str(error)) from None
     report_missing_points(ladder, (strictness,))
     named = (name for zone in scene.setup(sensor).zones.values() for name in zone.gestures or ())
@@ -210,6 +212,14 @@ def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float
         if not isinstance(least, int | float) or not 0 <= least <= 1:
             raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")
     return told
+
+
+def _seconds(t: Any) -> float:
+    """A time as a float, since times are added to others; NaN for what is no number."""
+    try:
+        return float(t) if hasattr(t, "__float__") else math.nan
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
 
 
 def _counts(values: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
