@@ -185,7 +185,7 @@ class Bank:
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
             self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
         ):
-            sensor.owner.heard = sensor.owner.source_heard = sensor.stamper.arrived = heard
+            sensor.owner.heard = sensor.owner.source_heard = sensor.stamper.arrived = sensor.vitals.last = heard
             sensor.stamper.last = last
             sensor.front_end.pace.interval_s, sensor.vitals.jitter_s = interval, jitter
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts

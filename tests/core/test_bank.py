@@ -136,6 +136,27 @@ def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
     assert sum("bad_taxels=1" in str(one) for one in known) > 10
 
 
+def test_a_sensor_that_sends_on_is_no_longer_intermittent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It fell silent after each few seconds, and then does so no more: it is well again while it is in a bank."""
+    names, said = [f"s{n}" for n in range(EACH)], list[object]()
+    for few in (FEW, 10**6):
+        monkeypatch.setattr(bank, "FEW", few)
+        hub, rng, states = Hub(Scene(GESTURES, (9, 9)), Sure()), np.random.default_rng(0), list[str]()
+        for k in range(450):
+            if k >= 225 or k % 75 < 45:
+                values = rng.normal(100.0, 2.0, (EACH, 81)).tolist()
+                packets = [
+                    encoding.message(f"/{name}/pressure", "f" * 81, one)
+                    for name, one in zip(names, values, strict=True)
+                ]
+                hub.receive([(packet, SOURCE) for packet in packets], k / 15)
+            hub.tick(k / 15)
+            states += hub.states(k / 15).values()
+        assert "intermittent" in states and states[-EACH:] == ["ok"] * EACH
+        said.append(states)
+    assert said[0] == said[1]
+
+
 def test_frames_of_one_time_are_spaced_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that shows tenths of seconds has one time for several frames, which may be read at once."""
     known = list[object]()
