@@ -7,7 +7,7 @@ replay` plays. `front_ends` is the path up to the segments, without a classifier
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -90,18 +90,19 @@ def _sensor(name: str, state: str, reading: Reading) -> Line:
 
 
 def as_line(event: Event) -> Line:
-    """An event with the keys that the tapes know: nobody asks for provisional events, or has gestures of his own."""
-    line = {"type": type(event).__name__} | asdict(event)
+    """An event with the keys that the tapes know. What has a default was added later, and no tape knows it."""
+    said = asdict(event)
     if isinstance(event, Gesture | Unknown):
-        where = line.pop("where")
+        where = said["where"]
         assert all(0 <= where[end][axis] <= 1 for end in ("start", "end") for axis in "xy") and where["zone"] is None
     if isinstance(event, Gesture | Unknown | Cancelled):
-        assert line.pop("provisional") is None
+        assert said["provisional"] is None  # nobody asks for these
     if isinstance(event, Gesture):
-        assert line.pop("own") is False
+        assert said["own"] is False
     if isinstance(event, Unknown):
-        assert line.pop("reason") in ("confidence", "hole", "rate") and not line.pop("gates")
-    return line
+        assert said["reason"] in ("confidence", "hole", "rate") and not said["gates"]
+    known = [one.name for one in fields(event) if one.default is one.default_factory is MISSING]
+    return {"type": type(event).__name__} | {name: said[name] for name in known}
 
 
 def replay(tape: Tape, model: Ladder) -> list[Line]:
