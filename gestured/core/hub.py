@@ -45,6 +45,7 @@ class Hub:
         self._owners: frozenset[Source] = frozenset()
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
+        self._ticked = -math.inf  # s, the last tick
         self._due = math.inf  # s, when the first contact of all sensors may be over
         self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
         self._later = later
@@ -164,6 +165,7 @@ class Hub:
         facts += self.wait(now)
         sensors = self._sensors.values()
         self._banks.show()
+        self._ticked = now
         self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
             sensor.review(now, facts)
@@ -265,12 +267,18 @@ class Hub:
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
         silent = {name: self._unheard(name, now) for name in self._scene.sensors}
-        return silent | {name: sensor.reading(now) for name, sensor in tuple(self._sensors.items())}
+        return silent | {
+            name: sensor.reading(self._as_of(sensor, now)) for name, sensor in tuple(self._sensors.items())
+        }
 
     def states(self, now: float) -> dict[str, str]:
         """The state of each sensor that `readings` has, at a fraction of the price."""
         silent = dict.fromkeys(self._scene.sensors, "no_data")
-        return silent | {name: sensor.condition(now)[0] for name, sensor in self._sensors.items()}
+        return silent | {name: sensor.condition(self._as_of(sensor, now))[0] for name, sensor in self._sensors.items()}
+
+    def _as_of(self, sensor: Sensor, now: float) -> float:
+        """When what is known of a sensor at `now` held: of one in a bank, when that was looked at last."""
+        return min(now, max(self._ticked, sensor.owner.heard)) if sensor.name in self._banks.homes else now
 
     def listening(self, now: float) -> list[Gate]:
         """What gates and arming say at `now`, of the sensors of which they say anything."""

@@ -157,6 +157,24 @@ def test_a_sensor_that_sends_on_is_no_longer_intermittent(monkeypatch: pytest.Mo
     assert said[0] == said[1]
 
 
+def test_a_sensor_that_sends_is_not_stale_between_two_ticks() -> None:
+    """The daemon ticks four times a second, and a sensor may count as gone after less."""
+    hub, rng, names = Hub(Scene(GESTURES, (9, 9), stale_s=0.2), Sure()), np.random.default_rng(0), set[str]()
+    for k in range(300):
+        packets = [
+            encoding.message(f"/s{n}/pressure", "f" * 81, one)
+            for n, one in enumerate(rng.normal(100.0, 2.0, (EACH, 81)).tolist())
+        ]
+        hub.receive([(packet, SOURCE) for packet in packets], k / 15)
+        if k % 4 == 3:
+            hub.tick(k / 15)
+        if k > 30:
+            names |= {*hub.states(k / 15).values(), *(one.state for one in hub.readings(k / 15).values())}
+    assert names == {"ok"}
+    hub.tick(k / 15 + 0.25)
+    assert set(hub.states(k / 15 + 0.3).values()) == {"stale"}
+
+
 def test_frames_of_one_time_are_spaced_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that shows tenths of seconds has one time for several frames, which may be read at once."""
     known = list[object]()
