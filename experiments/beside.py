@@ -14,8 +14,7 @@ from gestured.core.points import USUAL
 from gestured.core.scene import Setup
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday.command import at
-from gestured.lab.everyday.heard import Heard, hear
-from gestured.lab.everyday.hours import judged, points_of
+from gestured.lab.everyday.hours import Heard, hear, judged, points_of
 from gestured.lab.everyday.stretches import Stretch
 from gestured.lab.table import Table
 from gestured.model.shipped import shipped

@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.pages import add_document, tell
 from gestured.core.classifier import Classifier
-from gestured.lab.stability.path import Series, events, labels, simulated_series
+from gestured.lab.stability.extremes import Series, events, labels, simulated_series
 from gestured.lab.table import Table, Value
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped

@@ -15,8 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.adapt.adaptation import settled
-from gestured.lab.adapt.judging import Answers, Interval, Shares
+from gestured.lab.adapt.adaptation import Answers, Interval, Shares, settled
 from gestured.lab.adapt.learning import Course, opinions, simulate
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.cli import CACHE

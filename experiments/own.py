@@ -13,10 +13,8 @@ import numpy as np
 from experiments.pages import add_document, tell
 from gestured.core.own import EXAMPLES
 from gestured.lab.cli import CACHE
-from gestured.lab.own.learn import Seen, Trial, played_through
-from gestured.lab.own.play import played
-from gestured.lab.own.signs import JUDGED
-from gestured.lab.own.teach import embedding_of
+from gestured.lab.own.learn import Seen, Trial, embedding_of, played_through
+from gestured.lab.own.play import JUDGED, played
 from gestured.lab.table import Table
 from gestured.model.prototypes import Space
 

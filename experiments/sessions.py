@@ -15,8 +15,7 @@ import gestured
 from experiments.pages import add_document, tell
 from experiments.trained import options, trained
 from gestured.core.points import USUAL
-from gestured.lab.everyday.heard import Heard, hear
-from gestured.lab.everyday.hours import Hours, judged
+from gestured.lab.everyday.hours import Heard, Hours, hear, judged
 from gestured.lab.everyday.stretches import recorded
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES

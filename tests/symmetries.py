@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gestured.core.frames import Segment
-from gestured.lab.stability.path import Array, Series
+from gestured.lab.stability.extremes import Array, Series
 
 MIRRORED = {
     "swipe_left": "swipe_right",

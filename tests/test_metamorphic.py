@@ -15,7 +15,7 @@ from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
 from gestured.core.mounting import Mounting
 from gestured.lab.dataset import cuts
-from gestured.lab.stability.path import Series, events, labels, simulated_series
+from gestured.lab.stability.extremes import Series, events, labels, simulated_series
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped

@@ -5,7 +5,7 @@ from gestured.core.frames import Frame
 from gestured.core.points import Strictness
 from gestured.core.scene import Setup
 from gestured.lab.everyday.command import at
-from gestured.lab.everyday.heard import Heard, hear
+from gestured.lab.everyday.hours import Heard, hear
 from gestured.lab.everyday.stretches import Stretch
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from gestured.lab.export import NAME
 from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
-from gestured.lab.manifest import NAME
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import REAL_SETS, TrainingPlan
 from gestured.model.opening import open_model

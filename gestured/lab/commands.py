@@ -9,8 +9,8 @@ import torch
 
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
-from gestured.lab.manifest import write_manifest
-from gestured.lab.own import teach as own
+from gestured.lab.export import write_manifest
+from gestured.lab.own import learn as own
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER

@@ -1,4 +1,4 @@
-"""Trained networks and forests -> .onnx files that say all about themselves.
+"""Trained networks and forests -> .onnx files that say all about themselves, and the manifest of a folder of them.
 
 Every file is verified before it is written: ONNX's checker, everything that the daemon checks, and outputs
 against the trained model's own within `PARITY`, for batches and windows of many lengths.
@@ -22,7 +22,8 @@ from sklearn.ensemble import RandomForestClassifier
 
 from gestured.core.errors import ModelError
 from gestured.core.window import Window
-from gestured.lab.forest_graph import OPSET, around_thresholds, forest_graph, forest_outputs
+from gestured.lab.digest import file_digest
+from gestured.lab.forest import OPSET, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
 from gestured.model.context import CALM, calm, chosen
 from gestured.model.file import SelfTest, sealed
@@ -223,3 +224,46 @@ def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.flo
         out[3] = 0.0
         out[4] = random.random(out[4].shape)
     return out.astype(np.float32)
+
+
+NAME = "manifest.json"
+
+
+def measured(model: Path) -> dict[str, Any]:
+    """What the manifest beside a model file holds of figures of this very file; empty where it knows another one."""
+    manifest = model.with_name(NAME)
+    entry = json.loads(manifest.read_text())["models"].get(model.name, {}) if manifest.exists() else {}
+    figures: dict[str, Any] = entry.get("figures", {})
+    return figures if entry.get("sha256") == file_digest(model) else {}
+
+
+def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
+    """Write `manifest.json` over the directory's .onnx files.
+
+    `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
+    is no model.
+    """
+    models = {}
+    for path in sorted(directory.glob("*.onnx")):
+        data = path.read_bytes()
+        try:
+            model = Model(data, path.stem)
+        except ValueError as error:
+            raise ModelError(f"{path}: {error}") from error
+        models[path.name] = {
+            "sha256": model.sha256,
+            "size": model.size,
+            "kind": model.metadata.kind,
+            "version": model.metadata.version,
+            "gestures": list(model.gestures),
+            "figures": figures.get(path.stem, {}),
+        }
+    with atomic_write(directory / NAME, PUBLIC) as file:
+        file.write((json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
+
+
+def _plain(value: Any) -> Any:
+    """The same with null for what is not a finite number: JSON has no NaN."""
+    if isinstance(value, Mapping):
+        return {key: _plain(of) for key, of in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

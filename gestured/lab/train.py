@@ -25,11 +25,10 @@ from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import DAY_S, OTHER_TRIALS, TRIALS, meant_on, recorded, simulated
 from gestured.lab.decide import calibration_of, confidence, decided, fit_decision, threshold
 from gestured.lab.digest import code_digest
-from gestured.lab.export import Facts, export_forest, export_net
+from gestured.lab.early import Foretold
+from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, targets
 from gestured.lab.forest import grow_forest
-from gestured.lab.foretold import Foretold
-from gestured.lab.manifest import write_manifest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.points import by_strictness, operating_points
 from gestured.lab.quantiles import answer_figures, quantiles

@@ -5,8 +5,7 @@ import pytest
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import FIRST
 from gestured.lab.everyday.command import at
-from gestured.lab.everyday.heard import Heard, hear
-from gestured.lab.everyday.hours import judged, points_of
+from gestured.lab.everyday.hours import Heard, hear, judged, points_of
 from gestured.lab.everyday.stretches import lived
 from gestured.model.shipped import shipped
 

@@ -19,8 +19,7 @@ from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import ABSENT_S, Sensor
 from gestured.lab.cli import main
 from gestured.lab.everyday import FIRST, command
-from gestured.lab.everyday.heard import HELD, NOT_READY, RESTARTING, Heard, hear
-from gestured.lab.everyday.hours import FEW, LEVELS, judged, points_of
+from gestured.lab.everyday.hours import FEW, HELD, LEVELS, NOT_READY, RESTARTING, Heard, hear, judged, points_of
 from gestured.lab.everyday.picture import draw
 from gestured.lab.everyday.report import figures, tables
 from gestured.lab.everyday.stretches import HEARD, WAKING, WOKEN, Stretch, lived

@@ -18,9 +18,8 @@ from torch import Tensor, nn
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.export import Facts, export_forest, export_net
-from gestured.lab.forest_graph import forest_outputs
-from gestured.lab.manifest import measured, write_manifest
+from gestured.lab.export import Facts, export_forest, export_net, measured, write_manifest
+from gestured.lab.forest import forest_outputs
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.features import feature_names
 from gestured.model.opening import open_model

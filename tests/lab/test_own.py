@@ -8,10 +8,9 @@ import pytest
 from experiments.own import figures
 from gestured.core.errors import ModelError
 from gestured.core.own import EXAMPLES
-from gestured.lab.own import teach
-from gestured.lab.own.learn import Seen, learn, played_through
-from gestured.lab.own.play import PLAN, REPETITIONS, repeated
-from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
+from gestured.lab.own import learn as own
+from gestured.lab.own.learn import Seen, learn, played_through, teach
+from gestured.lab.own.play import JUDGED, LEARNED, PLAN, REPETITIONS, SIGNS, repeated, sign
 from gestured.lab.samples import Sample, Samples, collect
 from gestured.model.context import CALM
 from gestured.model.model import Model
@@ -95,10 +94,10 @@ def drawn() -> Samples:
 
 
 def test_a_model_is_taught_and_its_file_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(teach, "played", lambda *_, **__: drawn())
+    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
     path = tiny_model.make(tmp_path / "tiny.onnx", own=tiny_model.own())
     before = Model(path.read_bytes(), "tiny")
-    space = teach.teach(path, tmp_path, 4, 1)
+    space = teach(path, tmp_path, 4, 1)
     after = Model(path.read_bytes(), "tiny")
     assert after.space is not None and before.space is not None
     assert np.allclose(after.space.directions, space.directions, atol=1e-4)
@@ -109,4 +108,4 @@ def test_a_model_is_taught_and_its_file_says_so(tmp_path: Path, monkeypatch: pyt
 def test_a_model_without_an_embedding_is_refused(tmp_path: Path) -> None:
     path = tiny_model.make(tmp_path / "tiny.onnx")
     with pytest.raises(ModelError, match="has no output 'embedding'"):
-        teach.teach(path, tmp_path, 1, 1)
+        teach(path, tmp_path, 1, 1)

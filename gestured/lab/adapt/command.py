@@ -13,15 +13,14 @@ import torch
 
 from gestured.client.say import say, say_json
 from gestured.core.errors import GesturedError
-from gestured.lab.adapt.adaptation import Adapted, adapt
-from gestured.lab.adapt.judging import Shares
+from gestured.lab.adapt.adaptation import Adapted, Shares, adapt
 from gestured.lab.adapt.learning import Course, simulate
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
-from gestured.lab.own.teach import PEOPLE, teach
+from gestured.lab.own.learn import PEOPLE, teach
 from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.samples import WINDOW, Samples

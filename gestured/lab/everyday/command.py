@@ -13,8 +13,7 @@ from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import report
-from gestured.lab.everyday.heard import Heard, hear
-from gestured.lab.everyday.hours import points_of
+from gestured.lab.everyday.hours import Heard, hear, points_of
 from gestured.lab.everyday.stretches import lived, recorded
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.table import Table

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gestured.core.points import USUAL, Strictness
-from gestured.lab.everyday.heard import Heard
-from gestured.lab.everyday.hours import FEW, Least, cost, curve, judged, points_of, shares
+from gestured.lab.everyday.hours import FEW, Heard, Least, cost, curve, judged, points_of, shares
 from gestured.lab.table import Table, Value
 from gestured.model.model import Model
 

@@ -2,21 +2,27 @@
 
 Each kind that somebody could perform is in turn the new gesture, of a person whom the space was not learned from, and
 with kinds that it was not learned from either; everything else that this person does must not be taken for it.
+`teach` writes what a model needs for its user's own gestures into its file.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+import onnx
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
+from gestured.core.errors import ModelError
 from gestured.core.own import EXAMPLES
-from gestured.lab.own.play import PLAN, REPETITIONS
-from gestured.lab.own.signs import SIGNS
+from gestured.lab.export import NAME, measured, write_manifest
+from gestured.lab.own.play import PLAN, REPETITIONS, SIGNS, played
 from gestured.lab.samples import Samples
+from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.model.prototypes import Array, Prototype, Space
+from gestured.record.files import PUBLIC, atomic_write
 
 ACCEPTED = (
     0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised
@@ -193,3 +199,45 @@ def _shrunk(covariance: Array) -> Array:
     size = len(covariance)
     even = np.trace(covariance) / size * np.eye(size)
     return np.asarray((1.0 - DIAGONAL) * covariance + DIAGONAL * np.diag(np.diag(covariance)) + EVEN * even)
+
+
+PEOPLE = 20  # to learn from
+QUICK_PEOPLE = 3
+
+
+def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
+    """Learn the space of a model that has an embedding, and write it into its file, and its manifest anew.
+
+    Raises ModelError for a model without one.
+    """
+    space = learn(Seen.by(embedding_of(path), played(cache, people, jobs)))
+    figures_of = {model.stem: measured(model) for model in path.parent.glob("*.onnx")}  # the graph stays the same
+    proto = onnx.load(path)
+    kept = {one.key: one.value for one in proto.metadata_props if one.key != "digest"} | {"own": space.to_json()}
+    onnx.helper.set_model_props(proto, kept)
+    data = sealed(proto.SerializeToString(deterministic=True))
+    try:
+        Model(data, path.stem)
+    except ValueError as error:
+        raise ModelError(f"{path}: not written: {error}") from error
+    with atomic_write(path, PUBLIC) as file:
+        file.write(data)
+    if path.with_name(NAME).exists():
+        write_manifest(path.parent, figures_of)
+    return space
+
+
+def open_file(path: Path) -> Model:
+    """A model that was made here; whether its file is the one in the manifest does not matter. Raises ModelError."""
+    try:
+        return Model(read_bytes(path), path.stem)
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from error
+
+
+def embedding_of(path: Path) -> Model:
+    """A model that can compare examples; ModelError for one that has no embedding."""
+    model = open_file(path)
+    if not model.embeds:
+        raise ModelError(f"{path}: has no output 'embedding', expected a model that gestured-lab train made")
+    return model

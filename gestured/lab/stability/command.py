@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from gestured.lab.made_of import made_of, renew
-from gestured.lab.stability.day import day_table
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
 from gestured.lab.stability.filters import filters_table
-from gestured.lab.stability.stiff import stiff_table
+from gestured.lab.stability.stiff import day_table, stiff_table
 from gestured.lab.table import Table
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped

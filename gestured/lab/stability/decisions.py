@@ -20,7 +20,7 @@ from gestured.lab.decide import Answers
 from gestured.lab.early import published
 from gestured.lab.fit import RECURRENT
 from gestured.lab.samples import WINDOW
-from gestured.lab.stability.path import FINITE, NOISE, SIGNAL, Array, finger, simulated_series
+from gestured.lab.stability.extremes import FINITE, NOISE, SIGNAL, Array, finger, simulated_series
 from gestured.lab.table import Table, Value
 from gestured.model.context import NAMES, calm
 from gestured.model.features import touch_pattern

@@ -2,13 +2,13 @@
 
 The rooms, from the data to the figures:
 
-    cohort, recorded      what is learned from and judged on; material: with the paper's Algorithm 1
+    cohort                what is learned from and judged on; material: with the paper's Algorithm 1
     views                 what a classifier sees of a gesture
-    nets, training        the networks; vectors: a support vector machine for many features
+    training              the networks, and how they learn
     methods               the registry: each method, its hyperparameters, the paper's figures
     protocols             who learns and who is judged; one cell of a table
     cells                 checkpoints and the schedule
-    tuning, tables, choices, sessions    one section of study.json each
-    run_time, fields      error against run time, in three fields; runners: what was learned, as it would ship
+    tables, choices, sessions    one section of study.json each
+    run_time              error against run time, in three fields, of what was learned as it would ship
     report, picture       study.json as Markdown and its pictures; `study` puts all together
 """

@@ -1,7 +1,12 @@
-"""What the paper leaves open: our choice, others that it could be, and what it matters.
+"""Hyperparameters, and what the paper leaves open: our choice, others that it could be, and what it matters.
 
-Each is varied alone, the rest as in the tuned setting; participants held out and no augmentation, except where the
-choice belongs to the paper's protocol (its length of all windows, the bounding box of its Algorithm 1).
+Hyperparameters are compared by cross-validation with participants left out, on people who are not judged anywhere else
+(`cohort.TUNING_SEED`); the paper compares them on those whom it judges. The grids are coarse and small. Networks are
+compared after fewer batches than they are trained for afterwards. What wins without augmentation is used with it too,
+which the paper does not (its Table IV has two columns).
+
+Each choice is varied alone, the rest as in the tuned setting; participants held out and no augmentation, except where
+it belongs to the paper's protocol (its length of all windows, the bounding box of its Algorithm 1).
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,9 +21,8 @@ from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import SHIFT, THRESHOLD, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.plan import Plan
-from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
-from gestured.lab.study.tables import right, task
+from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Result, Task
+from gestured.lab.study.tables import Plan, right, task
 from gestured.lab.study.views import POOLED, TAXELS, Values
 
 WAVELET_NAMES, WAVELET_LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
@@ -118,3 +122,40 @@ def choices(
         told = {"choice": choice.choice, "ours": choice.ours, "method": choice.method}
         out.append({**told, "alternatives": rows})
     return out
+
+
+TUNING = "tuning"  # the name of the data
+
+
+def tune(plan: Plan, people: Data | None, schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
+    """The best hyperparameters of each method on `people`, and every candidate's figures; the first ones without."""
+    if people is None:
+        return {method.id: method.grid[0] for method in METHODS.values()}, []
+    asked: dict[tuple[str, int], tuple[Values, Task]] = {}
+    for method in METHODS.values():
+        for values in method.grid:
+            shorter = {**values, "steps": plan.tuning_steps} if method.network else values
+            asked[method.id, len(asked)] = (
+                values,
+                replace(task(method, shorter, UNCHANGED, PARTICIPANTS, TUNING, plan), folds=plan.tuning_folds),
+            )
+    found = schedule.results([item[1] for item in asked.values()], {TUNING: people}, "hyperparameters")
+    chosen: dict[str, Values] = {}
+    rows = []
+    for method in METHODS.values():
+        candidates: list[dict[str, Any]] = [
+            {"values": dict(values), **_figures(found[of])}
+            for (name, _), (values, of) in asked.items()
+            if name == method.id
+        ]
+        best = max(candidates, key=lambda c: float(c["right"]))
+        chosen[method.id] = best["values"]
+        rows.append({"method": method.id, "candidates": candidates, "chosen": best["values"]})
+    return chosen, rows
+
+
+def _figures(result: Result) -> dict[str, float]:
+    """Share right, and its standard deviation between folds."""
+    good, fold = right(result), np.array(result["fold"])
+    shares = [good[fold == k].mean() for k in np.unique(fold)]
+    return {"right": round(float(good.mean()), 4), "spread": round(float(np.std(shares)), 4)}

@@ -1,7 +1,8 @@
 """The simulated cohort of 3060 as the study needs it: each gesture's segment, its window, and who did what and how.
 
 Every trial goes through the front end that the daemon runs. A trial whose gesture was not cut out is lost and
-counted; where several segments hold parts of it, the one that holds most of it stands for it.
+counted; where several segments hold parts of it, the one that holds most of it stands for it. Beside it
+stand recordings that it does not hold: the public development recordings, and those that judge alone.
 """
 
 import hashlib
@@ -13,13 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.errors import GesturedError
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.dataset import TRIALS, cuts, in_processes, matched, truths
+from gestured.lab.dataset import TRIALS, cuts, in_processes, matched, recorded, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.samples import WINDOW, Samples, collect, sample
+from gestured.lab.train import REAL_FILES
+from gestured.record.arrays import read
 from gestured.record.files import PUBLIC, atomic_write
-from gestured.simulator import Trial, cohort_take
+from gestured.simulator import GESTURES, NONE, Trial, cohort_take
 
 SEED = 0  # of the cohort that learns and is judged
 TUNING_SEED = 1  # of other people, on whom hyperparameters are compared
@@ -100,3 +104,39 @@ def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]
     }  # fmt: skip
     with atomic_write(path, PUBLIC, durable=False) as file:
         np.savez(file, **fields)
+
+
+REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no textile"
+
+
+def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, Any]] | None:
+    """Gestures of the real development recordings (at most `of_each` a subject) and what they are; None without them.
+
+    Only the file of cut gestures: the whole sessions hold the same touches again.
+    """
+    if folder is None or not (folder / REAL_FILES[0]).exists():
+        return None
+    found = read(folder / REAL_FILES[0])
+    if of_each is not None:
+        gestures = np.flatnonzero(found.labels != NONE)
+        first = [gestures[found.subjects[gestures] == s][:of_each] for s in np.unique(found.subjects)]
+        found = found.take(np.sort(np.concatenate(first)))
+    samples = recorded(found)
+    known = np.isin(samples.labels, GESTURES)
+    about = {
+        "name": REAL_NAME, "subjects": len(np.unique(samples.people)), "gestures": int(known.sum()),
+        "non_gestures": int((~known).sum()),
+    }  # fmt: skip
+    return samples.take(known), about
+
+
+def judges(path: Path) -> tuple[Samples, dict[str, Any]]:
+    """Gestures of a file that judge every method and teach none, and how many were performed and cut out."""
+    found = read(path)
+    performed = int(np.isin(found.labels, GESTURES).sum())
+    samples = recorded(found.take(np.flatnonzero(np.isin(found.labels, GESTURES))))
+    samples = samples.take(np.isin(samples.labels, GESTURES))
+    if not len(samples):
+        raise GesturedError(f"{path}: expected gestures that can be cut out, found none")
+    people = len(np.unique(samples.people))
+    return samples, {"name": path.name, "participants": people, "performed": performed, "cut": len(samples)}

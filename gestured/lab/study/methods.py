@@ -20,8 +20,7 @@ from sklearn.preprocessing import StandardScaler
 from torch import nn
 
 from gestured.lab.study import views
-from gestured.lab.study.nets import HistoryNet, SequenceNet
-from gestured.lab.study.training import Indices, Inputs, train_net
+from gestured.lab.study.training import HistoryNet, Indices, Inputs, SequenceNet, train_net
 from gestured.lab.study.vectors import VectorMachine
 from gestured.lab.study.views import (
     FRAMES,

@@ -1,35 +1,168 @@
 """Error against run time: what a gesture costs, from the segment that was cut to the answer, on one core.
 
-What is timed are the study's methods and the models that ship (`runners`), window, features and decision included. What
+What is timed are the study's methods and the models that ship, window, features and decision included: networks and
+forests in onnxruntime (one thread), as in the daemon, the rest in scikit-learn. What
 counts is the processor's time, so that other programs on the machine do not. All take turns gesture by gesture, in
 another order each time: cold, 67 ms after the last one, as in a daemon at 15 Hz whose caches other programs have filled
 since; and warm, the same gesture at once again. All are judged on people whom none has learned from, neither the
 study's models, which learned from the whole cohort with shifted copies, nor the shipped ones.
+
+How often each is wrong is said in three fields. `simulated` are those new people. `foreign` and `real` of the study's
+methods are the cells of these protocols (every gesture that was cut out is answered); of the shipped models what they
+publish of the other generator's windows, and the manifest's figures of real subjects, each judged by networks that
+never saw it.
 """
 
 import os
+import pickle
+import tempfile
 import time
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
+from torch import Tensor, nn
 
 from gestured.core.frames import Segment
-from gestured.lab.evaluate import outcome
+from gestured.lab.evaluate import model_answers, outcome
+from gestured.lab.export import measured
+from gestured.lab.forest import OPSET, forest_graph
 from gestured.lab.intervals import summary
 from gestured.lab.progress import progress
-from gestured.lab.samples import WINDOW
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.cohort import Cohort
-from gestured.lab.study.fields import field_of
-from gestured.lab.study.material import Data
-from gestured.lab.study.plan import Plan
-from gestured.lab.study.runners import Runner, runners
+from gestured.lab.study.material import SHIFT, UNCHANGED, Data, classes
+from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.protocols import FOREIGN, PARTICIPANTS, REAL, fitted, material
+from gestured.lab.study.tables import TUNED, Cell, Plan, task
+from gestured.lab.study.training import SENSOR_SIDE, Answering, HistoryNet, Net
 from gestured.lab.study.views import Values
+from gestured.lab.train import REAL_SETS
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
+
+SHIPPED = {"cnn_lstm": "cnn_lstm", "lstm": "lstm", "tp_rf": "touch_pattern_rf"}  # methods, and the models that ship
+
+
+class Runner(Protocol):
+    """One model, from a segment to its answer."""
+
+    method: str
+    settings: str
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """The class that it holds for the best, and whether it says so or rejects."""
+        ...
+
+    def size(self) -> int:
+        """Bytes on disk."""
+        ...
+
+
+class Graph:
+    """A network or a forest as ONNX, opened as the daemon does: one thread, no spinning."""
+
+    def __init__(self, data: bytes) -> None:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        options.log_severity_level = 3
+        self.data = data
+        self._session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+
+    @classmethod
+    def of_net(cls, module: nn.Module) -> "Graph":
+        """Of a trained network; batch, and time where there is one, stay open."""
+        if isinstance(module, HistoryNet):
+            return cls._traced(module, torch.rand(2, SENSOR_SIDE, SENSOR_SIDE), {0: "B"})
+        return cls._traced(Answering(module), torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE), {0: "B", 1: "T"})
+
+    @classmethod
+    def _traced(cls, net: nn.Module, example: Tensor, axes: dict[int, str]) -> "Graph":
+        with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+            warnings.simplefilter("ignore")  # the tracer's; tests compare the graph with the network
+            path = Path(folder) / "net.onnx"
+            torch.onnx.export(
+                net.eval(), (example,), path, dynamo=False, opset_version=OPSET,
+                input_names=["inputs"], output_names=["scores"], dynamic_axes={"inputs": axes, "scores": {0: "B"}},
+            )  # fmt: skip
+            return cls(path.read_bytes())
+
+    def run(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(1, ...) inputs -> (1, G) scores."""
+        return np.asarray(self._session.run(["scores"], {self._session.get_inputs()[0].name: inputs})[0])
+
+
+@dataclass
+class Learned:
+    """A method of the study, which rejects nothing."""
+
+    method: str
+    values: Values
+    model: Estimator | Graph
+    settings: str = TUNED
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """As in `Runner`."""
+        seen = METHODS[self.method].view.one(WINDOW.apply(segment), self.values)
+        if isinstance(self.model, Estimator):
+            return int(self.model.fitted.predict(seen)[0]), True
+        return int(self.model.run(seen).argmax()), True
+
+    def size(self) -> int:
+        """The graph, or scikit-learn's own form."""
+        return len(pickle.dumps(self.model.fitted)) if isinstance(self.model, Estimator) else len(self.model.data)
+
+
+@dataclass
+class Shipped:
+    """A model that ships."""
+
+    method: str
+    path: Path
+    model: Model
+    settings: str = "shipped"
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """As in `Runner`, by the model's own threshold."""
+        found = self.model.classify(segment)
+        best = int(found.values.argmax())
+        name = self.model.gestures[best]
+        return GESTURES.index(name), found.confidence >= found.threshold
+
+    def size(self) -> int:
+        """The file."""
+        return self.path.stat().st_size
+
+
+def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]:
+    """Every method, fitted to all gestures and their shifted copies, then the shipped models."""
+    out: list[Runner] = []
+    for method in progress(METHODS.values(), len(METHODS), "models to be timed"):
+        of_task = task(method, tuned[method.id], SHIFT, PARTICIPANTS, "simulated", plan)
+        of, inputs = material(of_task, data)
+        model = fitted(of_task, inputs, np.arange(len(of.labels)), of.labels)
+        values = dict(of_task.values)
+        if isinstance(model, Net):
+            out.append(Learned(method.id, values, Graph.of_net(model.module)))
+        elif isinstance(model, Estimator) and method.id.endswith("_rf"):
+            graph = forest_graph(model.fitted, len(GESTURES), {}).SerializeToString(deterministic=True)
+            out.append(Learned(method.id, values, Graph(graph)))
+        elif isinstance(model, Estimator):
+            out.append(Learned(method.id, values, model))
+    return out + [Shipped(method, shipped()[name], open_model(shipped()[name])) for method, name in SHIPPED.items()]
+
 
 WARM = 20  # gestures that are answered before anything is timed
 
@@ -97,3 +230,48 @@ def _one_core() -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, cores)
+
+
+SEEN = {"foreign": (FOREIGN, SHIFT), "real": (REAL, UNCHANGED)}  # protocol and augmentation of the study's own cells
+
+
+def field_of(evaluation: Mapping[str, Any]) -> dict[str, Any]:
+    """Of an `Evaluation` as JSON has it: the gestures said wrongly, and those said wrongly or lost, with intervals."""
+    right, wrong = (
+        [evaluation[name], *(evaluation["intervals"][name][end] for end in ("low", "high"))]
+        for name in ("right", "wrong")
+    )
+    error = [1 - right[0], 1 - right[2], 1 - right[1]]
+    shares = {"wrong": wrong, "error": error}
+    ends = {f"{name}{end}": of[k] for name, of in shares.items() for k, end in enumerate(("", "_low", "_high"))}
+    return {name: round(share, 4) for name, share in ends.items()} | {"performed": evaluation["gestures"]}
+
+
+def with_fields(
+    rows: Sequence[Mapping[str, Any]], cells: Mapping[Cell, Mapping[str, Any]], judges: tuple[Samples, int] | None
+) -> list[dict[str, Any]]:
+    """The rows of run time with all fields; `cells` as study.json has them, `judges` and how many were performed."""
+    return [{**row, "fields": row["fields"] | _others(row, cells, judges)} for row in rows]
+
+
+def _others(
+    row: Mapping[str, Any], cells: Mapping[Cell, Mapping[str, Any]], judges: tuple[Samples, int] | None
+) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    if row["settings"] == "shipped":
+        path = shipped()[SHIPPED[row["method"]]]
+        model = open_model(path)
+        if judges and model.metadata.window == WINDOW and model.gestures == tuple(GESTURES):
+            samples, performed = judges
+            answers = model_answers(model, samples)
+            judged = outcome(answers, classes(samples), model.threshold, performed, samples.people)
+            found["foreign"] = field_of(asdict(judged))
+        if real := measured(path).get("real", {}).get(REAL_SETS[0]):
+            found["real"] = field_of(real)
+        return found
+    for field, (protocol, augmentation) in SEEN.items():
+        if cell := cells.get(Cell(row["method"], TUNED, augmentation, protocol, field)):
+            wrong = {"low": 1 - cell["high"], "high": 1 - cell["low"]}
+            ends = {"wrong": wrong, "right": cell}
+            found[field] = field_of({**cell, "wrong": 1 - cell["right"], "gestures": cell["n"], "intervals": ends})
+    return found

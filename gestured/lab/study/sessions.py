@@ -20,10 +20,9 @@ from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
 from gestured.lab.study.material import SHIFT, Data, pool
 from gestured.lab.study.methods import METHODS, Estimator
-from gestured.lab.study.nets import Answering
-from gestured.lab.study.plan import Plan
-from gestured.lab.study.runners import SHIPPED
-from gestured.lab.study.training import Net
+from gestured.lab.study.run_time import SHIPPED
+from gestured.lab.study.tables import Plan
+from gestured.lab.study.training import Answering, Net
 from gestured.lab.study.views import Values
 from gestured.model.features import feature_names
 from gestured.simulator import GESTURES, Take

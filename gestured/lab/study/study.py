@@ -18,18 +18,16 @@ import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew
-from gestured.lab.study import cohort, recorded, tables
+from gestured.lab.study import cohort, tables
 from gestured.lab.study.cells import Schedule
-from gestured.lab.study.choices import choices
-from gestured.lab.study.fields import with_fields
+from gestured.lab.study.choices import TUNING, choices, tune
 from gestured.lab.study.material import Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.picture import write_picture
-from gestured.lab.study.plan import Plan
 from gestured.lab.study.report import choice, write_report
-from gestured.lab.study.run_time import measure
+from gestured.lab.study.run_time import measure, with_fields
 from gestured.lab.study.sessions import online
-from gestured.lab.study.tuning import TUNING, tune
+from gestured.lab.study.tables import Plan
 from gestured.lab.study.views import Values
 from gestured.model.shipped import shipped
 from gestured.record.files import PUBLIC, atomic_write
@@ -69,8 +67,8 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
     """Everything that study.json holds; `others` are recordings that judge and teach nothing."""
     start = time.monotonic()
     schedule.cache.mkdir(parents=True, exist_ok=True)
-    real = recorded.real(folder, plan.real)  # first, so that a wrong file is told of before half an hour of work
-    foreign = recorded.judges(others) if others else None
+    real = cohort.real(folder, plan.real)  # first, so that a wrong file is told of before half an hour of work
+    foreign = cohort.judges(others) if others else None
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
     sets = {"simulated": Data.of("simulated", people.samples)}
     if real:

@@ -11,7 +11,7 @@ import pytest
 
 from gestured.lab.adapt import command
 from gestured.lab.cli import main
-from gestured.lab.own import teach as own
+from gestured.lab.own import learn as own
 from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import said
 from gestured.model.opening import open_model

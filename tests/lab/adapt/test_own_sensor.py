@@ -9,7 +9,7 @@ import pytest
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab
-from gestured.lab.own import teach as own
+from gestured.lab.own import learn as own
 from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES

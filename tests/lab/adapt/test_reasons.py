@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from gestured.lab.adapt.adaptation import Adapted, Settled
-from gestured.lab.adapt.judging import Shares
+from gestured.lab.adapt.adaptation import Adapted, Settled, Shares
 
 NOTHING: Any = None  # what no reason looks at
 

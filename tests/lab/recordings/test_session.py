@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from gestured.lab.recordings import session as module
+from gestured.lab.recordings import collect as module
+from gestured.lab.recordings.collect import Session
 from gestured.lab.recordings.protocol import left, order
 from gestured.lab.recordings.quality import Captured
-from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
 from gestured.record.arrays import read
 from tests.lab.recordings.test_quality import performed

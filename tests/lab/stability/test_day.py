@@ -1,6 +1,6 @@
 """A day through a front end: what it holds does not grow, and is the same whenever the same frames come."""
 
-from gestured.lab.stability.day import day_table
+from gestured.lab.stability.stiff import day_table
 
 
 def test_the_same_hours_leave_the_same_behind() -> None:

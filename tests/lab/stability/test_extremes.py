@@ -11,8 +11,7 @@ from gestured.core.frames import Segment
 from gestured.core.window import Window
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.decisions import segment_cases
-from gestured.lab.stability.extremes import Case, streams, swipes_found, whole_path_table
-from gestured.lab.stability.path import Series, fault, swipes
+from gestured.lab.stability.extremes import Case, Series, fault, streams, swipes, swipes_found, whole_path_table
 from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.opening import open_model

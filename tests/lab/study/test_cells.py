@@ -12,8 +12,8 @@ from joblib import Parallel
 from gestured.core.errors import GesturedError
 from gestured.lab.study import cells, study
 from gestured.lab.study.cells import Schedule
-from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, PARTICIPANTS
+from gestured.lab.study.tables import Plan
 from tests.lab.study.material_made import data
 from tests.lab.study.test_protocols import task
 

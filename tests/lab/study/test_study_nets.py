@@ -7,8 +7,8 @@ import torch
 from gestured.lab.study import training
 from gestured.lab.study.material import classes
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.nets import HistoryNet, SequenceNet
-from gestured.lab.study.runners import Graph
+from gestured.lab.study.run_time import Graph
+from gestured.lab.study.training import HistoryNet, SequenceNet
 from tests.lab.study.material_made import samples
 
 KINDS = ("lstm", "cnn_lstm", "cnn_gru")

@@ -12,7 +12,7 @@ from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.made_of import LINE
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.plan import Plan
+from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
 
 SECTIONS = ("about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "online")
