@@ -10,7 +10,6 @@ import torch
 from torch import nn
 
 from gestured.lab import fit, train
-from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
@@ -23,6 +22,7 @@ from gestured.lab.fit import (
     logits,
     padded,
     pretrain,
+    save,
     targets,
 )
 from gestured.lab.progress import progress as shown
@@ -102,9 +102,9 @@ def test_training_changes_every_net_and_lowers_the_loss(
 def test_weights_survive_the_file(samples: Samples, tmp_path: Path) -> None:
     torch.manual_seed(3)
     nets = build()
-    save_nets(tmp_path / "new" / "nets.npz", nets)
-    alike(nets, load_nets(tmp_path / "new" / "nets.npz"))
-    assert [p.name for p in (tmp_path / "new").iterdir()] == ["nets.npz"]
+    save(tmp_path / "new" / "nets.pt", nets.state_dict())
+    alike(nets, load_nets(tmp_path / "new" / "nets.pt"))
+    assert [p.name for p in (tmp_path / "new").iterdir()] == ["nets.pt"]
 
 
 def test_every_sample_is_learned_from_once_an_epoch(samples: Samples) -> None:
