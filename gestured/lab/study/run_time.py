@@ -189,8 +189,6 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),
                 "file_bytes": runner.size(),
             })  # fmt: skip
-    for row in rows:
-        row["front"] = not any(_beats(other, row) for other in rows)
     return rows
 
 
@@ -210,12 +208,6 @@ def _timed(found: list[Runner], segments: list[Segment], seed: int) -> list[tupl
                 found[k].answer(segment)
                 times.append(time.process_time() - start)
     return list(zip(cold, warm, strict=True))
-
-
-def _beats(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether `one` is at least as right and as fast, and better at one of them."""
-    first, second = (one["right"], -one["median_us"]), (other["right"], -other["median_us"])
-    return first != second and all(a >= b for a, b in zip(first, second, strict=True))
 
 
 @contextmanager

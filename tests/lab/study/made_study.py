@@ -103,8 +103,7 @@ def _run_time(method: str) -> list[Study]:
         }  # fmt: skip
         rows.append({
             "method": method, "settings": settings, **_between(right), "median_us": median,
-            "p95_us": 1.4 * median, "cold_us": 2.5 * median, "front": ships,
-            "file_bytes": int(900 * median),
+            "p95_us": 1.4 * median, "cold_us": 2.5 * median, "file_bytes": int(900 * median),
             "fields": {"simulated": field, "foreign": field, "real": {"wrong": 0.01, "error": 0.04, "performed": 3000}},
         })  # fmt: skip
     return rows

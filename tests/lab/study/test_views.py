@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 from scipy import stats
-from sklearn.svm import SVC
 
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.training import Images, Windows
-from gestured.lab.study.vectors import VectorMachine
 from gestured.lab.study.views import POOLED, band_statistics, motion_history, paper_features, spatio_temporal
 from tests.lab.made import gestures, line, window
 from tests.lab.study.material_made import samples
@@ -53,15 +51,6 @@ def test_touch_patterns_are_the_papers() -> None:
     assert np.allclose(found, [mean, 1.0, variability, *rows, *columns, 0.5, 0.5, 2 / 15])
     assert np.array_equal(paper_features(np.concatenate([window, np.zeros((5, 2, 2), np.float32)])), found)
     assert np.isfinite(paper_features(window[:1])).all() and np.isfinite(paper_features(0 * window)).all()
-
-
-def test_a_vector_machine_with_a_finished_kernel_answers_as_scikit_learns() -> None:
-    rng = np.random.default_rng(1)
-    x, y = rng.normal(size=(120, 40)), rng.integers(0, 4, 120)
-    x[np.arange(120), y] += 2.0
-    ours, theirs = VectorMachine(8.0, 0.01).fit(x[:80], y[:80]), SVC(C=8.0, gamma=0.01).fit(x[:80], y[:80])
-    assert np.array_equal(ours.predict(x), theirs.predict(x))
-    assert np.allclose(ours.decision_function(x), theirs.decision_function(x), atol=1e-3)
 
 
 def test_statistics_against_a_second_opinion() -> None:
