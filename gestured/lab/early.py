@@ -194,12 +194,8 @@ class Foretold:
 
     @classmethod
     def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
-        """As `of`, with so many non-gestures of each part as sessions hold (`OTHERS`), drawn at random."""
-        return cls.of([(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts])
-
-    @classmethod
-    def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
-        """Ask each part's networks about its samples."""
+        """Ask each part's networks about its samples, with so many non-gestures, drawn at random, as sessions hold."""
+        parts = [(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts]
         whole: list[Evidences] = []
         released: list[Evidences] = []
         early: list[Evidences] = []

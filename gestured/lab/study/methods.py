@@ -8,7 +8,7 @@ setting. Feature vectors are standardised over what is learned from before KNN a
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from sklearn.svm import SVC
 from torch import nn
 
 from gestured.lab.study import views
-from gestured.lab.study.training import HistoryNet, Indices, Inputs, SequenceNet, train_net
+from gestured.lab.study.training import HistoryNet, Indices, Inputs, Net, SequenceNet, train_net
 from gestured.lab.study.views import (
     FRAMES,
     TAXELS,
@@ -34,14 +34,6 @@ from gestured.lab.study.views import (
     Values,
     View,
 )
-
-
-class Scorer(Protocol):
-    """What has been learned."""
-
-    def scores(self, inputs: Any, index: Indices) -> NDArray[np.float64]:
-        """(n, K) probabilities of the chosen inputs."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -99,7 +91,9 @@ class Method:
     id: str
     title: str
     view: View
-    fit: Callable[[Any, Indices, Indices, int, Values, int], Scorer]  # inputs, chosen, labels, classes, values, seed
+    fit: Callable[
+        [Any, Indices, Indices, int, Values, int], Estimator | Net
+    ]  # inputs, chosen, labels, classes, values, seed
     grid: tuple[Values, ...]  # candidates for tuning, whole sets of hyperparameters
     paper: Mapping[str, Values] | None  # by augmentation; None beyond the paper
     published: Mapping[str, float]  # the paper's share right, by augmentation
@@ -173,7 +167,7 @@ def _net(
 def _train(
     make: Callable[[int, Values], nn.Module],
     inputs: Inputs, index: Indices, labels: Indices, classes: int, values: Values, seed: int,
-) -> Scorer:  # fmt: skip
+) -> Net:  # fmt: skip
     return train_net(partial(make, classes, values), inputs, index, labels, values["steps"], values["rate"], seed)
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.study.material import JUDGE, SHIFT, THRESHOLD, Data, Form, Pool, pool
-from gestured.lab.study.methods import METHODS, Scorer
-from gestured.lab.study.training import Indices
+from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.training import Indices, Net
 from gestured.lab.study.views import View
 from gestured.simulator import GESTURES
 
@@ -101,7 +101,7 @@ def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:
         yield np.flatnonzero(~np.isin(people[of.source], fold)), np.flatnonzero(np.isin(people, fold))
 
 
-def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -> Scorer:
+def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -> Estimator | Net:
     """The task's method, fitted to a part of its inputs."""
     return METHODS[task.method].fit(inputs, train, labels, len(GESTURES), dict(task.values), task.seed)
 

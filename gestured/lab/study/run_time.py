@@ -18,11 +18,11 @@ import pickle
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -45,7 +45,6 @@ from gestured.lab.study.tables import TUNED, Cell, Plan, task
 from gestured.lab.study.training import SENSOR_SIDE, Answering, HistoryNet, Net
 from gestured.lab.study.views import Values
 from gestured.lab.train import REAL_SETS
-from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
@@ -53,19 +52,14 @@ from gestured.simulator import GESTURES
 SHIPPED = {"cnn_lstm": "cnn_lstm", "lstm": "lstm", "tp_rf": "touch_pattern_rf"}  # methods, and the models that ship
 
 
-class Runner(Protocol):
+@dataclass(frozen=True)
+class Runner:
     """One model, from a segment to its answer."""
 
     method: str
     settings: str
-
-    def answer(self, segment: Segment) -> tuple[int, bool]:
-        """The class that it holds for the best, and whether it says so or rejects."""
-        ...
-
-    def size(self) -> int:
-        """Bytes on disk."""
-        ...
+    answer: Callable[[Segment], tuple[int, bool]]  # the class that it holds for the best, and whether it says so
+    size: int  # bytes on disk
 
 
 class Graph:
@@ -104,46 +98,30 @@ class Graph:
         return np.asarray(self._session.run(["scores"], {self._session.get_inputs()[0].name: inputs})[0])
 
 
-@dataclass
-class Learned:
-    """A method of the study, which rejects nothing."""
+def _learned(method: str, values: Values, model: Estimator | Graph) -> Runner:
+    """A method of the study, which rejects nothing; of scikit-learn's the size is that of its own form."""
+    view = METHODS[method].view
 
-    method: str
-    values: Values
-    model: Estimator | Graph
-    settings: str = TUNED
+    def answer(segment: Segment) -> tuple[int, bool]:
+        seen = view.one(WINDOW.apply(segment), values)
+        if isinstance(model, Estimator):
+            return int(model.fitted.predict(seen)[0]), True
+        return int(model.run(seen).argmax()), True
 
-    def answer(self, segment: Segment) -> tuple[int, bool]:
-        """As in `Runner`."""
-        seen = METHODS[self.method].view.one(WINDOW.apply(segment), self.values)
-        if isinstance(self.model, Estimator):
-            return int(self.model.fitted.predict(seen)[0]), True
-        return int(self.model.run(seen).argmax()), True
-
-    def size(self) -> int:
-        """The graph, or scikit-learn's own form."""
-        return len(pickle.dumps(self.model.fitted)) if isinstance(self.model, Estimator) else len(self.model.data)
+    size = len(pickle.dumps(model.fitted)) if isinstance(model, Estimator) else len(model.data)
+    return Runner(method, TUNED, answer, size)
 
 
-@dataclass
-class Shipped:
-    """A model that ships."""
+def _shipped(method: str, path: Path) -> Runner:
+    """A model that ships, by its own threshold."""
+    model = open_model(path)
 
-    method: str
-    path: Path
-    model: Model
-    settings: str = "shipped"
-
-    def answer(self, segment: Segment) -> tuple[int, bool]:
-        """As in `Runner`, by the model's own threshold."""
-        found = self.model.classify(segment)
-        best = int(found.values.argmax())
-        name = self.model.gestures[best]
+    def answer(segment: Segment) -> tuple[int, bool]:
+        found = model.classify(segment)
+        name = model.gestures[int(found.values.argmax())]
         return GESTURES.index(name), found.confidence >= found.threshold
 
-    def size(self) -> int:
-        """The file."""
-        return self.path.stat().st_size
+    return Runner(method, "shipped", answer, path.stat().st_size)
 
 
 def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]:
@@ -154,14 +132,15 @@ def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]
         of, inputs = material(of_task, data)
         model = fitted(of_task, inputs, np.arange(len(of.labels)), of.labels)
         values = dict(of_task.values)
+        form: Estimator | Graph
         if isinstance(model, Net):
-            out.append(Learned(method.id, values, Graph.of_net(model.module)))
-        elif isinstance(model, Estimator) and method.id.endswith("_rf"):
-            graph = forest_graph(model.fitted, len(GESTURES), {}).SerializeToString(deterministic=True)
-            out.append(Learned(method.id, values, Graph(graph)))
-        elif isinstance(model, Estimator):
-            out.append(Learned(method.id, values, model))
-    return out + [Shipped(method, shipped()[name], open_model(shipped()[name])) for method, name in SHIPPED.items()]
+            form = Graph.of_net(model.module)
+        elif method.id.endswith("_rf"):
+            form = Graph(forest_graph(model.fitted, len(GESTURES), {}).SerializeToString(deterministic=True))
+        else:
+            form = model
+        out.append(_learned(method.id, values, form))
+    return out + [_shipped(method, shipped()[name]) for method, name in SHIPPED.items()]
 
 
 WARM = 20  # gestures that are answered before anything is timed
@@ -187,7 +166,7 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
                 "fields": {"simulated": field_of(asdict(judged))},
                 "cold_us": round(float(np.median(cold)) * 1e6, 1), "median_us": round(float(np.median(warm)) * 1e6, 1),
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),
-                "file_bytes": runner.size(),
+                "file_bytes": runner.size,
             })  # fmt: skip
     return rows
 

@@ -22,7 +22,7 @@ from gestured.lab.study.material import SHIFT, Data, pool
 from gestured.lab.study.methods import METHODS, Estimator
 from gestured.lab.study.run_time import SHIPPED
 from gestured.lab.study.tables import Plan
-from gestured.lab.study.training import Answering, Net
+from gestured.lab.study.training import Answering
 from gestured.lab.study.views import Values
 from gestured.model.features import feature_names
 from gestured.simulator import GESTURES, Take
@@ -43,7 +43,6 @@ def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None
     if isinstance(model, Estimator):
         export_forest(model.fitted, path, facts, feature_names(WINDOW.rows, WINDOW.columns))
     else:
-        assert isinstance(model, Net)
         torch.set_num_threads(1)
         export_net(Answering(model.module), path, facts)
 
