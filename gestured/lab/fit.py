@@ -174,7 +174,8 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
             _fit_scale(net, samples, chosen, config)
     steps = config.epochs * len(list(_plan(samples, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
-    done, parts = 0, {"nets": nets, "optimiser": optimiser, "schedule": schedule}
+    parts: dict[str, Any] = {"nets": nets, "optimiser": optimiser, "schedule": schedule}
+    done = 0
     if checkpoint.exists():
         kept = torch.load(checkpoint, weights_only=True)
         done = kept["epochs"]

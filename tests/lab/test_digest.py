@@ -1,14 +1,14 @@
 """The digest of code by which the lab knows what it has computed before: what changes it, and what does not."""
 
-import os
+import importlib.util
 import shutil
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import gestured
+from gestured.lab import made_of
 from gestured.lab.digest import code_digest
 
 
@@ -19,11 +19,18 @@ def copy(tmp_path: Path) -> Path:
     return tmp_path / "gestured"
 
 
+def digest_of(package: Path) -> Callable[[str, frozenset[str]], str]:
+    """The function as that package has it, which reads that package's code."""
+    spec = importlib.util.spec_from_file_location("digest_of_a_copy", package / "lab" / "digest.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found: Callable[[str, frozenset[str]], str] = module.code_digest
+    return found
+
+
 def digest(package: Path, module: str) -> str:
-    code = f"from gestured.lab.digest import code_digest; print(code_digest({module!r}))"
-    environ = {**os.environ, "PYTHONPATH": str(package.parent)}  # before the installed one
-    command = [sys.executable, "-P", "-c", code]
-    return subprocess.run(command, env=environ, capture_output=True, text=True, check=True).stdout.strip()
+    return digest_of(package)(module, frozenset())
 
 
 def test_comments_docstrings_and_line_breaks_are_no_code(copy: Path) -> None:
@@ -58,13 +65,10 @@ def test_code_that_is_not_used_does_not_count(copy: Path, room: str) -> None:
     assert digest(copy, "gestured.lab.dataset") == before
 
 
-def test_a_table_names_the_code_that_decides_it_and_no_more(copy: Path) -> None:
-    code = "from gestured.lab.made_of import decides; print(decides(), decides(('gestured.core.where',)))"
-
+def test_a_table_names_the_code_that_decides_it_and_no_more(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def told() -> list[str]:
-        environ = {**os.environ, "PYTHONPATH": str(copy.parent)}
-        command = [sys.executable, "-P", "-c", code]
-        return subprocess.run(command, env=environ, capture_output=True, text=True, check=True).stdout.split()
+        monkeypatch.setattr(made_of, "code_digest", digest_of(copy))
+        return [made_of.decides.__wrapped__(code) for code in (made_of.DECIDES, ("gestured.core.where",))]
 
     begun = told()
     for room, changed in (

@@ -52,7 +52,7 @@ def test_enough_of_the_events_is_confirmed_on_other_people(honest: bool) -> None
     held = []
     for seed in range(8):
         found = calibrated(world(seed, honest=honest), GESTURES, None)
-        other = world(1000 + seed, 20_000, honest=honest)
+        other = world(1000 + seed, 8_000, honest=honest)
         share, given = share_confirmed(other, events(other, found, GESTURES))
         held.append(share >= CONFIRMED - 0.005)
         assert given > 0

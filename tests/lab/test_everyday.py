@@ -42,8 +42,12 @@ def afternoon() -> Heard:
     return hear(lived(FIRST, SHORT_S), command.rungs("cnn_lstm"), "normal")
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
-    assert main(["everyday", "--json", "--jobs", "1", *map(str, arguments)]) == 0
+def said(capsys: pytest.CaptureFixture[str], *arguments: object, apart: bool = False) -> dict[str, Any]:
+    """What the command says, in this process or, `apart`, in one of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not apart:
+            patch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
+        assert main(["everyday", "--json", "--jobs", "1", *map(str, arguments)]) == 0
     found: dict[str, Any] = json.loads(capsys.readouterr().out)
     return found
 
@@ -111,7 +115,7 @@ def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.Cap
     (model, *_) = command.rungs("cnn_lstm")
     events = list(Replay(tape, maker.scene, model).events())
     names = [event.gesture for event in events if isinstance(event, Gesture)]
-    found = said(capsys, "--recordings", path)
+    found = said(capsys, "--recordings", path, apart=True)
     assert {name: of["false"] for name, of in found["gestures"].items() if of["false"]} == {
         name: names.count(name) for name in names
     }

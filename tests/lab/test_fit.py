@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import nn
 
-from gestured.lab import fit, train
+from gestured.lab import dataset, fit, train
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
@@ -72,28 +72,27 @@ def interrupted(samples: Samples, checkpoint: Path, after: int) -> nn.ModuleDict
     return nets
 
 
-@pytest.mark.parametrize("after", [0, 1, 2])
-def test_a_killed_run_goes_on_as_if_nothing_had_been(samples: Samples, tmp_path: Path, after: int) -> None:
-    """With the same dropout, too."""
-    alike(interrupted(samples, tmp_path / "parts.npz", after), pretrain(samples, SMALL, tmp_path / "whole.npz"))
-
-
-def test_training_is_the_same_every_time(samples: Samples, tmp_path: Path) -> None:
-    first = pretrain(samples, SMALL, tmp_path / "first.npz")
-    torch.manual_seed(99)
-    np.random.default_rng(99).random()
-    alike(first, pretrain(samples, SMALL, tmp_path / "second.npz"))
-
-
-def test_training_changes_every_net_and_lowers_the_loss(
-    samples: Samples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture(scope="module")
+def whole(samples: Samples, tmp_path_factory: pytest.TempPathFactory) -> tuple[nn.ModuleDict, list[float]]:
+    """The networks of a run that nothing disturbed, and its loss by epoch."""
     losses: list[float] = []
     real = fit.one_epoch
-    monkeypatch.setattr(fit, "one_epoch", lambda *a: losses.append(real(*a)) or losses[-1])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "one_epoch", lambda *a: losses.append(real(*a)) or losses[-1])
+        return pretrain(samples, SMALL, tmp_path_factory.mktemp("whole") / "checkpoint.pt"), losses
+
+
+@pytest.mark.parametrize("after", [0, 2])
+def test_a_killed_run_goes_on_as_if_nothing_had_been(
+    samples: Samples, whole: tuple[nn.ModuleDict, list[float]], tmp_path: Path, after: int
+) -> None:
+    """Training is the same every time, whatever was drawn before it, and with the same dropout."""
+    alike(interrupted(samples, tmp_path / "parts.pt", after), whole[0])
+
+
+def test_training_changes_every_net_and_lowers_the_loss(whole: tuple[nn.ModuleDict, list[float]]) -> None:
     torch.manual_seed(SMALL.seed)
-    before = weights(build())
-    after = weights(pretrain(samples, SMALL, tmp_path / "checkpoint.npz"))
+    before, after, losses = weights(build()), weights(whole[0]), whole[1]
     assert losses[-1] < losses[0]
     for name, value in before.items():
         assert not np.array_equal(value, after[name]), name
@@ -156,11 +155,14 @@ def everyone() -> dict[str, Samples]:
     """One take of each participant of each stream, and some of the wide one by seed."""
     people = {person: k for k, (person, *_) in enumerate(OTHER_TRIALS)}
     trials = {trial.participant: trial.index for trial in TRIALS}
+    patch = pytest.MonkeyPatch()
+    patch.setattr(dataset, "DAY_S", 120.0)
     made = {f"wide{seed}": collect(s for i in range(25) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
     for number, (stream, seed) in enumerate(
         (("days", 1), ("days", 2), ("nominal_days", 3), ("days_by_chance", 1), ("days_by_chance", 2))
     ):
         made[f"{stream}{seed}"] = collect(s for s in STREAMS[stream](seed, 40 + number))
+    patch.undo()
     made["cohort"] = collect(s for i in trials.values() for s in STREAMS["cohort"](0, i))
     made["others"] = collect(s for i in people.values() for s in STREAMS["others"](0, i))
     return made

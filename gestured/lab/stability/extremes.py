@@ -116,7 +116,7 @@ class Case:
 def streams(quick: bool) -> Iterator[Case]:
     """Streams for the whole path."""
     base, at = swipes(2)
-    few = 9 if quick else 1
+    few = 27 if quick else 1
     for power in (*range(-30, 31, 15 if quick else 5), -3, -2, -1, 1, 2, 3):
         for kind in (np.float32, np.float64):
             yield Case(

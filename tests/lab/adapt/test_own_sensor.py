@@ -36,7 +36,7 @@ def test_the_document_leads_to_a_model(
     for line in "".join(block.text for block in blocks("run", words)).splitlines():
         program, *arguments = shlex.split(line)
         if arguments[0] == "adapt":
-            arguments += ["--steps", "20", "--force"]  # whether it is better is another test's
+            arguments += ["--steps", "2", "--force"]  # whether it is better is another test's
         status = (gesturectl if program == "gesturectl" else lab)(arguments)
         said = capsys.readouterr()
         assert status == 0 or (arguments[0] == "adapt" and "written: " in said.out), said.err

@@ -33,6 +33,9 @@ def test_the_table_sees_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
 
         return run
 
+    few, extreme = decisions.performed_windows, decisions.extreme_windows
+    monkeypatch.setattr(decisions, "performed_windows", lambda count, kinds: few(4, kinds))
+    monkeypatch.setattr(decisions, "extreme_windows", lambda quick: extreme(quick)[:4])
     monkeypatch.setattr(decisions, "by_reference", turned)
     rows: list[Any] = decisions_table(["lstm"], quick=True).rows
     assert min(row[4] for row in rows) > 1e-3 and max(row[3] for row in rows) > 0

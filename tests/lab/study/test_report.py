@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from matplotlib.figure import Figure
 
 from gestured.lab.study.picture import FIELDS
 from gestured.lab.study.report import PROTOCOLS, choice, write_report
@@ -81,7 +82,8 @@ def test_all_else_is_told(report: Path, study: Study) -> None:
         assert len({line.count(" | ") for line in block.splitlines() if "---" not in line}) == 1
 
 
-def test_what_was_not_computed_is_a_dash_or_no_table(tmp_path: Path) -> None:
+def test_what_was_not_computed_is_a_dash_or_no_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gestured.lab.study.picture.confusion", lambda study: Figure())
     study = made_study() | {"online": [], "online_shipped": [], "choices": [], "tuning": [], "run_time": []}
     study["data"] |= {"real": None, "foreign": None}
     study["about"]["quick"] = True
