@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gestured.control.cli import main
+from gestured.core.facts import Dropped
 from gestured.record import tape_reader
 from gestured.record.replay import Mute, Replay, maker, opened
 from tests.opening import in_bounds, refused
@@ -237,6 +238,20 @@ def test_a_model_that_only_the_tape_names_is_not_opened(
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and opened == []
     assert str(path) in err and str(planted) in err and "--model" in err
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.a.1", "1"])
+def test_a_sender_by_name_is_in_none_of_the_networks_that_may_send(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], host: str
+) -> None:
+    told = SCENE | {"settings": SETTINGS | {"allow": ["127.0.0.0/8"]}}
+    start = MAGIC + record(12, text("scene") + pairs(json=json.dumps(told)))
+    path = write(tmp_path / "a.mcap", channel(1, "/gestured/packets", source=f"{host}:5"), PACKET, start=start)
+    status = main(["replay", str(path)])
+    assert status == 0, capsys.readouterr().err
+    tape, made = opened(path)
+    facts = list(Replay(tape, made.scene, Mute(made.scene.gestures)).facts())
+    assert [fact.reason for fact in facts if isinstance(fact, Dropped)] == ["not_allowed"]
 
 
 def test_a_file_of_a_shipped_models_name_is_not_taken_for_it(

@@ -158,10 +158,16 @@ class Scene:
         return Timing(stale_s=self.stale_s, tap_gap_s=self.tap_gap_s)
 
     def may_send(self, host: str) -> bool:
-        """Whether a host's address lies in one of the networks of `allow`; any does where there are none."""
+        """Whether a host's address lies in one of the networks of `allow`; any does where there are none.
+
+        A name, as a tape may hold one, is no address.
+        """
         if not self.allow:
             return True
-        address = ipaddress.ip_address(host)
+        try:
+            address = ipaddress.ip_address(host)
+        except ValueError:
+            return False
         mapped = getattr(address, "ipv4_mapped", None)
         return any((mapped or address) in network for network in self.allow)
 
