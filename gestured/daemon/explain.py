@@ -7,8 +7,7 @@ from gestured import __version__
 from gestured.client.address import control_beside, default_socket
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.scene import DOUBLE_TAP
-from gestured.core.timing import Timing
-from gestured.daemon.asked import open_ladder, outputs_of
+from gestured.daemon.asked import open_ladder, outputs_of, scene_of
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
@@ -111,7 +110,7 @@ def _output(settings: Settings, ladder: Ladder) -> Said:
 
 def _answers(settings: Settings, ladder: Ladder) -> Said:
     """What is computed, how long an answer takes, and what is said before it."""
-    timing, metadata = Timing(tap_gap_s=settings.tap_gap_s), ladder.model.metadata
+    timing, metadata = scene_of(settings, ladder).timing, ladder.model.metadata
     rate_hz = metadata.window.rate_hz
 
     def felt(wait_s: float) -> str:
