@@ -51,13 +51,13 @@ class FitConfig:
     seed: int = 1
 
 
-RECURRENT = ("cnn_lstm", "lstm")  # networks that ship, each with the trajectory net as its second opinion
-NETS = (*RECURRENT, "trajectory")
 KINDS: dict[str, tuple[type[Opinion], float]] = {  # each with its learning rate, which falls to 0 with a cosine
     "cnn_lstm": (CnnLstm, 4e-3),
     "lstm": (Lstm, 8e-3),
     "trajectory": (TrajectoryNet, 3e-3),
 }
+NETS = tuple(KINDS)
+RECURRENT = tuple(name for name in KINDS if name != "trajectory")  # exported, with that net as their second opinion
 
 
 def build(names: Iterable[str] = NETS) -> nn.ModuleDict:

@@ -1,4 +1,4 @@
-"""The ten gestures: a function for each, from a occasion to the contacts a person makes."""
+"""The ten gestures: a function for each, from an occasion to the contacts a person makes."""
 
 import math
 from collections.abc import Callable

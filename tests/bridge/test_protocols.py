@@ -1,5 +1,7 @@
 """Bytes of serial lines to frames: whatever comes between frames, and however it is cut."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +13,7 @@ from gestured.bridge.readings import Protocol, Unwrapped, signed
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival
 
+ROOT = Path(__file__).parents[2]
 ROWS, COLUMNS = 4, 5
 SIZE = ROWS * COLUMNS
 GRIDS = {name: each.grid if each.fixed else (ROWS, COLUMNS) for name, each in PROTOCOLS.items()}
@@ -210,3 +213,8 @@ def test_a_counter_that_overflows_is_no_sensor_that_began_anew(bits: int, lost: 
 def test_a_counter_that_falls_elsewhere_began_anew(last: int, then: int):
     own = Unwrapped()
     assert own.of(last) - own.of(then) == last - then
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_documents_say_what_each_is(name: str):
+    assert f"| `{name}` |" in (ROOT / "docs" / "connect.md").read_text()
