@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gestured.bridge.counts import Counts
+from gestured.bridge.daemon import Daemon
 from gestured.client.fields import wrong_field
+from gestured.control.listen import readable
 from gestured.core.events import (
     Cancelled,
     Gate,
@@ -94,6 +97,17 @@ def test_an_event_belongs_to_all_that_it_is_told_and_none_of_them_can_change_it(
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, 1e60, -1e11, True])
 def test_a_number_that_is_no_time_is_named(value):
     assert wrong_field(LINES[0] | {"onset": value}) == f"onset {quoted(value)}: expected a number"
+
+
+@pytest.mark.parametrize("line", [{"type": "news", "sensor": "a"}, LINES[0]], ids=["unknown", "onset"])
+def test_a_time_that_a_newer_daemon_says_is_a_time_or_null(line):
+    """Whoever reads it may show it, or tell how old the line is."""
+    for value in (None, 1.8e9):
+        told = line | {"decided": value}
+        assert wrong_field(told) is None and "a" in readable(told, {})
+        assert Daemon(None, None, Counts("mqtt")).age(told, 1.8e9) == 0.0
+    for wrong in ("soon", 10**30, [1]):
+        assert (wrong_field(line | {"decided": wrong}) or "").startswith("decided ")
 
 
 @given(st.sampled_from(LINES), st.dictionaries(st.sampled_from(sorted({key for line in LINES for key in line})), ANY))

@@ -89,7 +89,7 @@ class Daemon:
 
         A sensor's own clock may be off by any time, so its lag is counted from the smallest one so far.
         """
-        if "decided" not in event:
+        if event.get("decided") is None:
             return 0.0
         lag = float(now - event["decided"])
         if event["sensor"] not in self._lags and len(self._lags) >= MOST_SENSORS:

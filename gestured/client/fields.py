@@ -66,6 +66,7 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     GATES: (_object(_is_gates), "an object of objects with armed, closed and until"),
     Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
 }
+_ANY: dict[str, Any] = {"type": str, "sensor": str} | dict.fromkeys(sorted(TIMES), float | None)  # of any line
 _EVENTS = {event.__name__.lower(): event for event in get_args(Event)}
 # Type of a line -> its fields, as they are annotated.
 _FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, event in _EVENTS.items()} | {
@@ -84,11 +85,12 @@ _ADDED = {
 def wrong_field(line: Mapping[str, Any]) -> str | None:
     """What is wrong with a daemon's line, such as `decided "soon": expected a number`; None where it is sound.
 
-    A newer daemon may say more, so unknown fields are passed over; of a line of unknown type only `sensor` counts.
+    A newer daemon may say more, so unknown fields are passed over, but for times, which may be null; of a line of
+    unknown type these and `sensor` count.
     """
     name = line.get("type")
     known = _FIELDS.get(name, {}) if isinstance(name, str) else {}
-    for key, annotation in ({"type": str, "sensor": str} | known).items():
+    for key, annotation in (_ANY | known).items():
         fits, words = _KINDS[annotation]
         if key not in line:
             if key == "type" or (key in known and key not in _ADDED.get(str(name), ())):

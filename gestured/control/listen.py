@@ -77,7 +77,7 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     """One event as one line for a person; `before` keeps the last provisional event of each sensor for its answer."""
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
-    moment = next((event[key] for key in TIMES if key in event), time.time())
+    moment = next((event[key] for key in TIMES if event.get(key) is not None), time.time())
     clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
     head = f"{clock}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
