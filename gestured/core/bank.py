@@ -52,6 +52,8 @@ class Banks:
         front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
         arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.source_heard}
+        if stamper.by_tag and stamper.tag is None:
+            return  # a bank could take none of its frames, and each would cost the way in and out
         if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
             frames = min(max(LEAD_S / front.pace.interval_s, 1.0), LEAD_FRAMES)  # slow sensors keep one, too
             kind = (*front.kind, stamper.by_tag, 2 << math.ceil(math.log2(frames)))

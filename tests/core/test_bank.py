@@ -175,6 +175,23 @@ def test_a_sensor_that_sends_is_not_stale_between_two_ticks() -> None:
     assert set(hub.states(k / 15 + 0.3).values()) == {"stale"}
 
 
+@pytest.mark.parametrize("tagged", [True, False])
+def test_a_sensor_whose_frames_no_bank_can_take_does_not_go_in_and_out(
+    tagged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That cost more than the frames: a clock of its own is set for a sensor that sends no time tags."""
+    hub, rng, entered, enter = Hub(SCENE, Sure()), np.random.default_rng(0), list[str](), Bank.enter
+    monkeypatch.setattr(Bank, "enter", lambda one, sensor: (entered.append(sensor.name), enter(one, sensor))[1])
+    for k in range(60):
+        packets = [
+            encoding.message(f"/clock{n}/pressure", "f" * 81, one)
+            for n, one in enumerate(rng.normal(100.0, 2.0, (EACH, 81)).tolist())
+        ]
+        packets = [encoding.bundle([packet], 1.7e9 + k / 15 if tagged else None) for packet in packets]
+        hub.receive([(packet, SOURCE) for packet in packets], k / 15)
+    assert sorted(entered) == ([f"clock{n}" for n in range(EACH)] if tagged else [])
+
+
 def test_frames_of_one_time_are_spaced_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that shows tenths of seconds has one time for several frames, which may be read at once."""
     known = list[object]()
