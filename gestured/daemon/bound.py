@@ -3,12 +3,12 @@
 import os
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from gestured.client.address import control_beside, default_socket
-from gestured.core.errors import GesturedError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import (
@@ -44,6 +44,7 @@ class Bound:
     control: Listener
     gates: Listener | None
     http: socket.socket | None
+    close: Callable[[], None]  # closes all sockets, and removes the paths that we made for them
 
     def addresses(self) -> dict[str, str | None]:
         """Where the daemon can be reached."""
@@ -55,56 +56,50 @@ class Bound:
             "metrics": name_of(self.http) if self.http else None,
         }
 
-    def close(self) -> None:
-        """Close all sockets, and remove the paths that we made for them."""
-        self.udp.close()
-        self.events.close()
-        self.control.close()
-        for other in (self.gates, self.http):
-            if other is not None:
-                other.close()
-
 
 def bind_all(settings: Settings) -> Bound:
     """Take what systemd passed and bind the rest. All or nothing; raises AddressError or SettingsError."""
     given = _by_name(_passed())
-    opened: list[socket.socket | Listener] = list(given.values())
-    try:
+    with ExitStack() as opened:
+        for sock in given.values():
+            opened.callback(sock.close)
         if (udp := given.get("osc")) is None:
-            opened.append(udp := bind_udp(settings.listen))
+            udp = bind_udp(settings.listen)
+            opened.callback(udp.close)
         else:
             stamp_arrivals(udp)
         since = time.monotonic()
         if (http := given.get("metrics")) is None and settings.metrics is not None:
-            opened.append(http := bind_tcp(settings.metrics))
+            http = bind_tcp(settings.metrics)
+            opened.callback(http.close)
         path = settings.socket
         if path is None and "events" not in given:
             path = default_socket(os.environ)
             make_default_directory(path.parent)
-        opened.append(events := _listener(given, "events", path, "socket"))
+        events = _listener(given, "events", path, opened, key="socket")
         path = path or events.path
         beside = settings.control or control_beside(path)
         if beside == path and "control" not in given:
             raise AddressError(f"control: {path} is the event socket, choose another path with --control")
-        opened.append(control := _listener(given, "control", beside, "control"))
-        gates = None
-        if "gates" in given or settings.gates is not None:
-            gates = _listener(given, "gates", settings.gates, "gates")
-    except GesturedError:
-        for sock in opened:
-            sock.close()
-        raise
+        control = _listener(given, "control", beside, opened)
+        asked = "gates" in given or settings.gates is not None
+        gates = _listener(given, "gates", settings.gates, opened) if asked else None
+        close = opened.pop_all().close
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
-    return Bound(udp, since, events, control, gates, http)
+    return Bound(udp, since, events, control, gates, http, close)
 
 
-def _listener(given: Mapping[str, socket.socket], name: str, path: Path | None, key: str) -> Listener:
+def _listener(
+    given: Mapping[str, socket.socket], name: str, path: Path | None, opened: ExitStack, *, key: str = ""
+) -> Listener:
     """What systemd passed under a name, else a socket at a path; `key` is the setting that an error names."""
     if name in given:
         return Listener(given[name])
     assert path is not None
-    return UnixListener(path, key)
+    made = UnixListener(path, key or name)
+    opened.callback(made.close)
+    return made
 
 
 def _passed() -> list[tuple[str, socket.socket]]:

@@ -11,6 +11,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
+from http import HTTPStatus
 
 from gestured.daemon.exposition import exposition
 from gestured.daemon.log import Throttle
@@ -23,14 +24,6 @@ REQUEST_BYTES = 8192  # of a request's head, at most
 HTTP_CONNECTIONS = 64  # at a time
 
 Response = tuple[int, str, bytes]  # status, content type, body
-_REASONS = {
-    200: "OK",
-    400: "Bad Request",
-    404: "Not Found",
-    405: "Method Not Allowed",
-    500: "Internal Server Error",
-    503: "Service Unavailable",
-}
 
 
 def as_json(status: int, body: Mapping[str, object]) -> Response:
@@ -133,7 +126,7 @@ class HttpThread:
             except Exception as error:  # a bug in a route costs this answer alone
                 status, kind, body = as_json(500, {"error": repr(error)})
         header = (
-            f"HTTP/1.1 {status} {_REASONS[status]}",
+            f"HTTP/1.1 {status} {HTTPStatus(status).phrase}",
             f"Content-Type: {kind}",
             f"Content-Length: {len(body)}",
             "Connection: close\r\n\r\n",

@@ -16,7 +16,6 @@ from typing import Any
 
 import structlog
 
-LOG_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
 PERIOD_S = 10.0  # the time in which lines of one reason are bounded
 REASONS = 64  # more than there are; a bound in case a peer can choose one of them
 WAITING_BYTES = 256 << 10  # bytes of lines that wait for a reader at most; later lines are thrown away, and counted
@@ -34,7 +33,7 @@ def configure(level: str) -> None:
             *([] if tty else [structlog.processors.format_exc_info]),
             structlog.dev.ConsoleRenderer() if tty else structlog.processors.JSONRenderer(),
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(LOG_LEVELS[level]),
+        wrapper_class=structlog.make_filtering_bound_logger(level),
         logger_factory=lambda *_: _Printer(),
         cache_logger_on_first_use=False,
     )

@@ -70,8 +70,8 @@ def _from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[
             continue
         if key in KEYS:
             found[key] = value
-        elif _platforms(name, value):
-            continue
+        elif SERVICE.fullmatch(name) or (PORT.fullmatch(name) and "://" in value):
+            continue  # a container platform sets it, for a service called gestured, or gestured-something
         elif near := _near(key, KEYS):
             variable = ENVIRONMENT + near.upper()
             raise SettingsError(f"{name} = {value!r} (environment): unknown key, did you mean {variable}?")
@@ -83,11 +83,6 @@ def _from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[
 def strange_variables(environ: Mapping[str, str]) -> list[str]:
     """The variables `GESTURED_*` that are no settings, and that no container platform sets by itself."""
     return _from_environment(environ)[1]
-
-
-def _platforms(name: str, value: str) -> bool:
-    """Whether a container platform sets this variable, for a service called gestured, or gestured-something."""
-    return bool(SERVICE.fullmatch(name) or (PORT.fullmatch(name) and "://" in value))
 
 
 def _near(key: str, known: Sequence[str]) -> str | None:

@@ -36,7 +36,9 @@ class Shift:
     def __init__(self, quantiles: Mapping[str, Any], window: Window) -> None:
         self._window = window
         self.ranges = {name: found for name in QUANTITIES if (found := _range(quantiles, name)) is not None}
-        names = [*self.ranges, *([UNKNOWN] if _mostly_known(quantiles) else [])]
+        share = quantiles.get(UNKNOWN)
+        mostly_known = isinstance(share, int | float) and 0 <= share < MANY
+        names = [*self.ranges, *([UNKNOWN] if mostly_known else [])]
         self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
 
     @classmethod
@@ -93,8 +95,3 @@ def _range(quantiles: Mapping[str, Any], name: str) -> tuple[float, float] | Non
     if name == "confidence":
         high = math.inf  # surer than in training is no fault
     return (low, high) if low <= high else None
-
-
-def _mostly_known(quantiles: Mapping[str, Any]) -> bool:
-    share = quantiles.get(UNKNOWN)
-    return isinstance(share, int | float) and 0 <= share < MANY

@@ -6,6 +6,7 @@ import os
 import socket
 import stat
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -87,15 +88,11 @@ def name_of(sock: socket.socket) -> str:
 
 
 class Listener:
-    """A listening Unix stream socket that somebody else made, and whose path is not ours to remove."""
+    """A listening Unix stream socket that somebody else made, whose path is not ours to remove."""
 
     def __init__(self, sock: socket.socket) -> None:
         self.sock = sock
         self.path = Path(os.fsdecode(sock.getsockname()))
-
-    def close(self) -> None:
-        """Stop listening; what stands at the path stays."""
-        self.sock.close()
 
 
 class UnixListener(Listener):
@@ -134,11 +131,9 @@ class UnixListener(Listener):
     def close(self) -> None:
         """Stop listening; remove the socket if it is still ours, and the lock."""
         self.sock.close()
-        try:
+        with suppress(OSError):  # somebody removed it already
             if self.path.lstat().st_ino == self._inode:
                 self.path.unlink()
-        except OSError:
-            pass  # somebody removed it already
         self._release_lock()
 
     def _take_lock(self) -> int:
@@ -156,10 +151,8 @@ class UnixListener(Listener):
             os.close(lock)
 
     def _release_lock(self) -> None:
-        try:
+        with suppress(OSError):
             self._lock_path.unlink()
-        except OSError:
-            pass
         os.close(self._lock)
 
     def _clear(self) -> None:
