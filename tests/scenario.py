@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown, Void
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed
@@ -356,4 +356,4 @@ def frames(*lines: str, seed: int = 0) -> list[Frame]:
 
 def contacts(front_end: FrontEnd, frame: Frame) -> list[Found]:
     """What a frame says of contacts: all that a front end finds in it, but for those that are not over."""
-    return [found for found in front_end.push(frame) if not isinstance(found, Shown)]
+    return [found for found in front_end.push(frame) if not isinstance(found, Segment)]

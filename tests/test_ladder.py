@@ -177,7 +177,7 @@ def test_each_rung_answers_with_its_own_operating_points_or_its_one_threshold(tm
     none = open_model(build(tmp_path / "none.onnx", calibration='{"threshold": 0.7}'))
     best = Fake("best", clock, error=ModelError("broken"))
     points = Ladder([best, some, none], clock=clock).classify(segment()).points
-    assert points is not None and points.points["strict"].thresholds == dict.fromkeys(GESTURES, STRICTER["strict"])
+    assert points is not None and points["strict"].thresholds == dict.fromkeys(GESTURES, STRICTER["strict"])
     scores = Ladder([best, none, some], clock=clock).classify(segment())
     assert (scores.points, scores.threshold) == (None, 0.7)
 

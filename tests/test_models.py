@@ -235,7 +235,7 @@ def test_a_model_without_operating_points_is_as_before_and_one_with_them_reports
     assert check(tmp_path / "old.onnx")["operating_points"] is None
     path = build(tmp_path / "new.onnx", operating_points=operating_points())
     model, stored = open_model(path), json.loads(operating_points())
-    assert model.points is not None and [list(row) for row in model.points.curve] == stored.pop("curve")
+    assert model.points is not None and [list(row) for row in model.metadata.curve] == stored.pop("curve")
     assert json.loads(json.dumps(check(path)))["operating_points"] == stored
     assert model.classify(segment()).points is model.points
 
@@ -253,11 +253,11 @@ def test_whatever_stands_for_operating_points_is_taken_or_refused_in_a_sentence(
 ) -> None:
     stored = json.loads(operating_points()) | {"eager": POINT | {key: value}} | changes
     try:
-        found = points.operating_points(stored, GESTURES)
+        found, _ = points.operating_points(stored, GESTURES)
     except ValueError as error:
         assert "expected" in str(error) and "\n" not in str(error)
         return
-    assert all(0 <= p.thresholds[g] <= 1 and 0 <= p.missed <= 1 for p in found.points.values() for g in GESTURES)
+    assert all(0 <= p.thresholds[g] <= 1 and 0 <= p.missed <= 1 for p in found.values() for g in GESTURES)
 
 
 def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:

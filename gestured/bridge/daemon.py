@@ -58,7 +58,7 @@ class Daemon:
         self.version = ""  # the last one that was there
         self.states: dict[str, str] = {}  # sensor -> how it is, the one heard of last at the end; kept while it is away
         self.gestures: list[str] | None = None  # None until it has said them
-        self.listening: dict[str, Line] = {}  # sensor -> what `messages.listening` says; none where there is nothing
+        self.listening: dict[str, Line] = {}  # sensor -> what gates and arming say; none where there is nothing
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._lags: dict[str, tuple[float, float]] = {}  # sensor -> its smallest lag, and when that was found
 

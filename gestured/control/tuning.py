@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.errors import GesturedError
-from gestured.core.points import USUAL, OperatingPoints
+from gestured.core.points import USUAL, Curve
 from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed, Said, owners, verdicts
 
@@ -97,11 +97,11 @@ def estimated(played: Played, least: float | Mapping[str, float], share: float |
     return found if played.performed else replace(found, missed=None if share is None else share * played.meant)
 
 
-def share_missed(points: OperatingPoints | None, threshold: float) -> float | None:
+def share_missed(curve: Curve, threshold: float) -> float | None:
     """What a model misses at a threshold of all gestures alike, by its curve; None for one that has none."""
-    if points is None:
+    if not curve:
         return None
-    thresholds, missed, _ = zip(*points.curve, (1.0, 1.0, 0.0), strict=True)  # nobody is surer than sure
+    thresholds, missed, _ = zip(*curve, (1.0, 1.0, 0.0), strict=True)  # nobody is surer than sure
     return float(np.interp(threshold, thresholds, missed))
 
 
@@ -177,9 +177,9 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
             f"--budget {budget:g}: {played.hours:.3g} hours cannot show it, even if nothing false was said in them, "
             f"expected at least {math.ceil(30 / budget) / 10:g} hours"
         )
-    alike = [estimated(played, t, share_missed(model.points, t)) for t in CANDIDATES]
-    stored = {} if model.points is None else model.points.points
-    points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored.items()}
+    alike = [estimated(played, t, share_missed(model.metadata.curve, t)) for t in CANDIDATES]
+    stored = (model.points or {}).items()
+    points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored}
     best, single = proposed(alike, model.threshold, most), dict[str, Counts]()
     if best is not None and best.threshold is not None and played.performed:
         single = for_each(played, best.threshold, no_more=most is not None)

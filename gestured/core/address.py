@@ -37,16 +37,6 @@ def _is_port(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= 5 and int(text) < 65536
 
 
-class Destination(NamedTuple):
-    """Where events are sent, and how. As a text SCHEME://HOST:PORT."""
-
-    scheme: str
-    address: Address
-
-    def __str__(self) -> str:
-        return f"{self.scheme}://{self.address}"
-
-
 class Grid(NamedTuple):
     """Rows and columns of a sensor's frames as they are sent, before rotation."""
 

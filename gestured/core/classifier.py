@@ -1,5 +1,6 @@
 """The Protocol of whatever scores segments (a model, or a ladder of models), and the scores that it gives."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
-from gestured.core.points import Certainty, OperatingPoints
+from gestured.core.points import Certainty, Point
 
 NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
 
@@ -32,7 +33,7 @@ class Scores:
     threshold: float = 0.5  # confidence from which it is published where there are no `points`, or a gesture has armed
     took_s: float = 0.0  # s that the model ran
     own: Match | None = None  # the nearest gesture of the user's own, where there are any
-    points: OperatingPoints | None = None  # of the model
+    points: Mapping[str, Point] | None = None  # operating points of the model, by strictness
 
     @property
     def confidence(self) -> float:

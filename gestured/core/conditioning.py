@@ -14,7 +14,7 @@ from gestured.core.activity import Activity, hardly_ever
 from gestured.core.contact import ON_SHARE, AfterEffect
 from gestured.core.idle import LOADED, Idle
 from gestured.core.quantiles import median
-from gestured.core.taxels import Inspection, Taxels
+from gestured.core.taxels import Taxels
 
 Array = NDArray[np.float64]
 
@@ -57,9 +57,6 @@ class Conditioner:
         """What (N,) counts at `t` s show. `after` says how far textile may still swing below its baseline."""
         if self.idle.smallest and self.idle.learns_step(raw):
             self.review()
-        return self._look(t, raw, after)
-
-    def _look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         above = raw - self.idle.counts
         scaled = above * self.weight
         activity, lowest = self.activity.measure(scaled)
@@ -78,22 +75,23 @@ class Conditioner:
         idle, bare = self.idle, self.idle.bare
         if bare is None:
             return None
-        weight = self._weigh(bare.sigma)
-        left = (look.raw - bare.counts) * weight
-        rested = self.activity.measure((idle.counts - bare.counts) * weight)[0]
+        counts, sigma = bare
+        weight = self._weigh(sigma)
+        left = (look.raw - counts) * weight
+        rested = self.activity.measure((idle.counts - counts) * weight)[0]
         if left.min() < -max(self.deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
             return None  # it lies there, is about to leave, or another thing has happened
-        idle.unload(bare, look.raw)
+        idle.unload(look.raw)
         self.review()
         after.leave(rested, look.t)
-        return self._look(look.t, look.raw, after)
+        return self.look(look.t, look.raw, after)
 
     def resting(self) -> tuple[float, float]:
         """The share of the taxels on which something rests that the baseline has learned, and its activity."""
-        bare = self.idle.bare
-        if bare is None:
+        if self.idle.bare is None:
             return 0.0, 0.0
-        load = (self.idle.counts - bare.counts) * self._weigh(bare.sigma)
+        counts, sigma = self.idle.bare
+        load = (self.idle.counts - counts) * self._weigh(sigma)
         return float(np.count_nonzero(load > LOADED)) / load.size, self.activity.measure(load)[0]
 
     def fallen(self, look: Look) -> float:
@@ -120,9 +118,7 @@ class Conditioner:
         learned = self.idle.settle(t, raw, rests=rests, restless=restless)
         if learned is None:
             return False
-        self.taxels.stuck.learn(learned.constant)
-        self.taxels.frozen.learn(fine=learned.fine)
-        self.taxels.flickering.learn()
+        self.taxels.learn(learned.constant, fine=learned.fine)
         self.activity.unlearn()
         self.review()
         self.activity.learn((learned.frames - self.idle.counts) * self.weight)
@@ -134,8 +130,8 @@ class Conditioner:
         idle, t = self.idle, look.t
         if idle.provisional or look.sunken:
             self.settle(t, look.raw)
-        elif idle.offered:
-            idle.unsettle()
+        elif idle.settling.since is not None:
+            idle.settling.clear()
         flickering = self.taxels.flickering
         if flickering.any or self.taxels.frozen.any:
             self._watch(look)
@@ -151,17 +147,8 @@ class Conditioner:
 
     def touched(self, look: Look) -> None:
         """The sensor is touched: the baseline stands still, and taxels that freeze or flicker are found."""
-        self.idle.hold()
+        self.idle.followed = None
         self._watch(look)
-
-    def inspect(self, frames: Array) -> Inspection:
-        """Look at the frames of a contact, (T, N) counts above the baseline, for taxels that stood still."""
-        return self.taxels.inspect(frames, self.idle.level)
-
-    def judge(self, seen: Inspection) -> None:
-        """The contact that was inspected is over: what was found counts as evidence that taxels are stuck."""
-        if self.taxels.stuck.judge(seen):
-            self.review()
 
     @property
     def sound(self) -> bool:

@@ -1,9 +1,6 @@
-"""What is remembered of a contact: when it was, where its centroid went, and what it leaves behind."""
+"""What is known of a contact: when it was, where its centroid went, and what it leaves behind."""
 
 import math
-from dataclasses import dataclass, field
-
-from gestured.core.timing import Timing
 
 Centroid = tuple[float, float]  # (row, column) in taxel pitches
 
@@ -12,7 +9,6 @@ ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, a
 RECOVERY_S = 1.0  # s, with which the after-effect fades; for so long after a contact the baseline follows faster
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
 SPIKE = 4.0  # times the second highest frame: a peak in a single frame counts as at most this
-SPAN_S = 0.15  # the length of a span; of three spans it is remembered how strongly the contact was pressed
 FIRM = 8.0  # times `on`: a contact's second highest frame counts as at least this, since a tap may have a single frame
 
 
@@ -34,24 +30,6 @@ class Stretch:
         top, left, bottom, right = min(top, row), min(left, column), max(bottom, row), max(right, column)
         self._box = (top, left, bottom, right)
         self.widest = max(self.widest, math.hypot(bottom - top, right - left))
-
-
-class Lately:
-    """How strongly a contact was pressed a moment ago."""
-
-    __slots__ = ("_since", "_tops")
-
-    def __init__(self, t: float) -> None:
-        self._since = t  # s, when the latest of the spans began
-        self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
-
-    def before(self, t: float, activity: float) -> float:
-        """Take a frame at `t` s; return the highest activity of the two spans before the present one, else 0."""
-        older, old, latest = self._tops
-        if t - self._since >= SPAN_S:
-            older, old, latest, self._since = old, latest, 0.0, t
-        self._tops = (older, old, max(latest, activity))
-        return max(older, old) if older else 0.0
 
 
 class AfterEffect:
@@ -108,45 +86,3 @@ class AfterEffect:
         if past > RECOVERY_S:
             peak = min(peak, SPIKE * max(self._next, FIRM * self._on))
         return ON_SHARE * peak * math.exp(-past / RECOVERY_S)
-
-
-@dataclass(slots=True)
-class Memory:
-    """The levels that the segmenter compares with, and what it remembers of the last contacts."""
-
-    timing: Timing
-    on: float  # noise units: activity from which there is a contact, if the last one has left nothing behind
-    off: float  # noise units: activity below which there is none
-    travel: float  # taxel pitches that a tap may move
-    wait_for_double_tap: bool
-    after: AfterEffect = field(init=False)  # the peak of the last contact, and what it leaves behind
-    contact: Stretch = field(init=False)  # the contact that goes on, or the last one
-    first: Stretch | None = field(init=False)  # the segment's first contact, if `contact` is its second
-    quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
-    lately: Lately = field(init=False)  # how strongly the contact was pressed a moment ago
-    rests: Stretch = field(init=False)  # since when a contact that was given up has stayed in its place
-    under: float = field(init=False)  # noise units, the activity of what lay there before the contact rose above it
-
-    def __post_init__(self) -> None:
-        self.after = AfterEffect(self.on)
-        self.clear()
-
-    def clear(self) -> None:
-        """Remember nothing of earlier contacts."""
-        self.after.clear()
-        self.first = self.quiet_since = None
-        self.rise(0.0)
-
-    def rise(self, t: float, under: float = 0.0) -> None:
-        """A contact begins at `t` s, above something that lies there with an activity of `under` noise units."""
-        self.contact, self.rests, self.lately, self.under = Stretch(t), Stretch(t), Lately(t), under
-
-    @property
-    def onset(self) -> float:
-        """When the segment began, in s."""
-        return self.contact.began if self.first is None else self.first.began
-
-    def tap_so_far(self) -> bool:
-        """Whether the contact is short and stayed where it was."""
-        contact = self.contact
-        return contact.touched - contact.began <= self.timing.tap_s and contact.widest <= self.travel

@@ -8,7 +8,6 @@ where it had moved and rests on both sides.
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,8 @@ from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.contact import RESTS, Centroid
-from gestured.core.frames import UNDISTURBED, Before, Segment
-from gestured.core.taxels import Inspection
+from gestured.core.frames import QUIET_S, UNDISTURBED, Before, Segment
+from gestured.core.taxels import Still
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; the largest that a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
@@ -25,12 +24,14 @@ LEAD_FRAMES = 200  # quiet frames kept at most: LEAD_S at 1000 Hz and more; a se
 HOLE_S = 0.25  # after longer without a frame nobody knows what the finger did meanwhile
 HOLE_FRAMES = 2.5  # intervals of the sensor: a slow sensor's hole may last so many, whatever the seconds
 CLEAR_S = 0.45  # the longest hole that a clear path excuses: five frames lost in a row at 15 Hz
+MOST_BEFORE = 64  # contacts that are remembered: more in ten seconds say nothing new
 SIDE = 3  # frames at most on each side of a hole from which its way is taken
 STRAIGHT = math.radians(40.0)  # angle up to which the way across the hole goes straight on from the way beside it
 BENT = math.radians(75.0)  # angle up to which that holds where both ways bend to the same side, as on a circle
 SLOWEST = 0.75  # times the speed beside the hole: a finger slower than that has turned a corner, or stopped
 
 
+Sight = tuple[float, Centroid]  # s, and where the finger was seen then
 _new = tuple.__new__  # Kept(...) takes twice the time
 
 
@@ -44,23 +45,6 @@ class Kept(NamedTuple):
     new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
 
 
-class Sight(NamedTuple):
-    """Where the finger was seen."""
-
-    t: float  # s
-    place: Centroid
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Made:
-    """A segment made of the kept frames, and held so that the classifier is given the same object when it is cut."""
-
-    segment: Segment
-    peak: float  # counts
-    bad: NDArray[np.bool_]  # (N,) taxels that are bridged in it
-    inspection: Inspection
-
-
 class Cutter:
     """Keeps the frames of a contact and shortly before it, and makes segments of them."""
 
@@ -69,28 +53,20 @@ class Cutter:
         self._conditioner = conditioner
         self._travel = travel
         self.kept: deque[Kept] = deque()
-        self._made: Made | None = None
+        # The segment that was made last, and its taxels: the classifier is given the same object when it is cut.
+        self._made: tuple[Segment, Still] | None = None
         self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
-        self._settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
+        self._began: deque[float] = deque(maxlen=MOST_BEFORE)  # s, of the contacts of the last ten seconds
+        self._ended = -math.inf  # s, the last contact's end
+        self._length_s = 0.0  # of the last contact
+        self.settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
         self.last_raw = b""  # raw counts of the last frame
         self.new = 0.0  # s, since when the frames show just these counts
-
-    def __len__(self) -> int:
-        """How many frames are kept."""
-        return len(self.kept)
-
-    def settled(self, t: float) -> None:
-        """The idle sensor has been watched until `t` s, and is known."""
-        self._settled = t
 
     def silent(self) -> None:
         """The stream paused: what follows was not seen to begin."""
         self.kept.clear()
-        self._settled = -math.inf
-
-    def clear(self) -> None:
-        """The sensor restarted: what was kept is no part of what follows."""
-        self.kept.clear()
+        self.settled = -math.inf
 
     def keep(self, look: Look, lost: int, place: Centroid | None) -> None:
         """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
@@ -106,32 +82,42 @@ class Cutter:
         while kept[0].t < t - LEAD_S or len(kept) > LEAD_FRAMES:
             kept.popleft()
 
-    def begin(self, before: Before) -> None:
-        """A contact begins, after what went on before it."""
-        self._before = before
+    def begin(self, t: float, covered: float, rest: float) -> None:
+        """A contact begins at `t` s on a sensor on which something rests, as `Before` has it."""
+        began = self._began
+        while began and t - began[0] > QUIET_S:
+            began.popleft()
+        quiet_s = min(t - self._ended, QUIET_S)
+        length_s = self._length_s if quiet_s < QUIET_S else 0.0
+        self._before = Before(quiet_s, len(began), length_s, covered, rest)
+        began.append(t)
+
+    def end(self, t: float) -> None:
+        """The contact is over at `t` s, or what had rested has left then."""
+        self._ended = t
+        if self._began:
+            self._length_s = max(t - self._began[-1], 0.0)
 
     def draft(self, onset: float, offset: float) -> Segment | None:
         """The segment of a contact that may be over; None where it has been asked for already."""
         before = self._made
         made = self._make(onset, offset)
-        return None if made is before else made.segment
+        return None if made is before else made[0]
 
-    def so_far(self, onset: float, offset: float) -> Segment:
-        """The segment of a contact that is not over; a later `draft` or `cut` does not see it."""
-        return self._segment(onset, offset)[0]
-
-    def cut(self, onset: float, offset: float) -> Made:
+    def cut(self, onset: float, offset: float) -> Segment:
         """The segment of a contact that is over, made after the contact has shown which taxels are stuck."""
-        self._conditioner.judge(self._make(onset, offset).inspection)
-        made, self._made = self._make(onset, offset), None
-        return made
+        _, still = self._make(onset, offset)
+        if self._conditioner.taxels.judge(still):
+            self._conditioner.review()
+        (segment, _), self._made = self._make(onset, offset), None
+        return segment
 
     def hole(self, onset: float, offset: float, until: float) -> float:
         """The longest time in s in which a finger may have done anything unseen, from before the onset to `until` s.
 
         It is infinite where the finger's arrival was not seen. What comes after `until` does not count.
         """
-        last, longest = self._settled, 0.0
+        last, longest = self.settled, 0.0
         for new in (*(kept.new for kept in self.kept), until):
             if new >= onset and new - last > longest:
                 if not HOLE_S < new - last <= CLEAR_S or not self._clear(onset, last, new, offset):
@@ -143,23 +129,26 @@ class Cutter:
         """Whether nothing hides in the hole from `begin` to `end` s of a contact."""
         if any(begin < kept.t < end for kept in self.kept):
             return False  # the sensor repeated a frame, so the segment shows a finger at rest that may have moved
-        seen = [Sight(k.t, k.place) for k in self.kept if k.place is not None and onset <= k.t <= offset]
-        before, after = [one for one in seen if one.t <= begin], [one for one in seen if one.t >= end]
+        seen = [(k.t, k.place) for k in self.kept if k.place is not None and onset <= k.t <= offset]
+        before, after = [one for one in seen if one[0] <= begin], [one for one in seen if one[0] >= end]
         return clear(before, after, self._travel)
 
-    def _make(self, onset: float, offset: float) -> Made:
+    def _make(self, onset: float, offset: float) -> tuple[Segment, Still]:
         """The segment of a contact: made once, unless a taxel has turned out to be bad since."""
-        made, conditioner = self._made, self._conditioner
-        if made is not None and (made.segment.onset, made.segment.offset) == (onset, offset):
-            if np.array_equal(made.bad, conditioner.taxels.bad):
+        made, taxels = self._made, self._conditioner.taxels
+        if made is not None and (made[0].onset, made[0].offset) == (onset, offset):
+            if made[0].bad is not None and np.array_equal(made[0].bad.reshape(-1), taxels.bad):
                 return made
-        segment, stack = self._segment(onset, offset)
-        inspection = conditioner.inspect(stack[segment.first : segment.last + 1])
-        self._made = Made(segment, float(segment.frames.max()), conditioner.taxels.bad, inspection)
+        segment, stack = self.segment(onset, offset)
+        still = taxels.inspect(stack[segment.first : segment.last + 1], self._conditioner.idle.level)
+        self._made = segment, still
         return self._made
 
-    def _segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
-        """The segment of all that is kept, and (T, N) counts above the baseline before bad taxels are bridged."""
+    def segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
+        """The segment of all that is kept, and (T, N) counts above the baseline before bad taxels are bridged.
+
+        A later `draft` or `cut` does not see it.
+        """
         kept, conditioner = list(self.kept), self._conditioner
         times = np.array([frame.t for frame in kept])
         stack = np.array([frame.above for frame in kept])
@@ -182,24 +171,25 @@ def clear(before: Sequence[Sight], after: Sequence[Sight], travel: float) -> boo
 
     `travel`: taxel pitches that a finger may move and still be where it was.
     """
-    if len(before) < 2 or len(after) < 2 or after[0].t - before[-1].t > CLEAR_S:
+    if len(before) < 2 or len(after) < 2 or after[0][0] - before[-1][0] > CLEAR_S:
         return False
     across = _way(before[-1], after[0])
     sides = (before[-SIDE:], after[:SIDE])
     ways = [_way(side[0], side[-1]) for side in sides]
     if math.hypot(*across) < travel:
-        came = max(math.dist(one.place, before[-1].place) for one in before)
+        came = max(math.dist(place, before[-1][1]) for _, place in before)
         return came >= 2 * travel and all(math.hypot(*way) < RESTS for way in ways)
     bends = [_turn(way, across) for way in ways if math.hypot(*way) >= RESTS]
     one_way = len(bends) == 2 and bends[0] * bends[1] < 0  # it bends to one side on both sides of the hole
     if not bends or max(map(abs, bends)) > (BENT if one_way else STRAIGHT):
         return False
-    usual = sum(math.hypot(*way) for way in ways) / sum(side[-1].t - side[0].t for side in sides)
-    return math.hypot(*across) >= SLOWEST * usual * (after[0].t - before[-1].t)
+    usual = sum(math.hypot(*way) for way in ways) / sum(side[-1][0] - side[0][0] for side in sides)
+    return math.hypot(*across) >= SLOWEST * usual * (after[0][0] - before[-1][0])
 
 
 def _way(one: Sight, other: Sight) -> Centroid:
-    return other.place[0] - one.place[0], other.place[1] - one.place[1]
+    (_, (row, column)), (_, (down, across)) = one, other
+    return down - row, across - column
 
 
 def _turn(one: Centroid, other: Centroid) -> float:

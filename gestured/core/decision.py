@@ -4,11 +4,9 @@ import math
 from collections.abc import Sequence
 
 from gestured.core.classifier import NEAR, Match, Scores
-from gestured.core.cutter import bearable_s
 from gestured.core.frames import Segment
 from gestured.core.points import Point
 from gestured.core.scene import Scene
-from gestured.core.timing import outside
 
 
 class Decision:
@@ -64,7 +62,7 @@ class Decision:
         return max(self.threshold(gesture, answer, armed=armed), 0.0 if point is None else point.provisional or 0.0)
 
     def _point(self, answer: Scores) -> Point | None:
-        return None if answer.points is None else answer.points.points[self._strictness]
+        return None if answer.points is None else answer.points[self._strictness]
 
     def is_own(self, match: Match | None, zone: str | None = None, *, known: bool) -> bool:
         """Whether a segment is the user's own gesture `match`; `known`: the model alone would have named it."""
@@ -80,18 +78,3 @@ class Decision:
     def published(self, gesture: str, segment: Segment) -> None:
         """Note that a gesture is published: its refractory pause begins."""
         self._last_offset[gesture] = segment.offset
-
-
-def whole(hole_s: float, interval_s: float) -> bool:
-    """Whether the longest time without a frame is too short for the finger to have moved unseen.
-
-    `interval_s`: from frame to frame, as they come.
-    """
-    return hole_s <= bearable_s(interval_s)
-
-
-def reason(rate_hz: float, *, whole: bool) -> str:
-    """Why a segment is unknown; a sensor that is too slow or too fast explains it first."""
-    if outside(rate_hz):
-        return "rate"
-    return "confidence" if whole else "hole"

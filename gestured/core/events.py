@@ -160,7 +160,7 @@ class Status:
     sensors: Mapping[str, str]  # state of each sensor
     model: str
     time: float  # s since the Unix epoch
-    gates: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # `messages.listening` of some sensors
+    gates: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # armed, closed, until of some sensors
 
 
 Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Touch | Gate | Status

@@ -1,7 +1,5 @@
 """The values that a front end works on: a frame, its touches, the segment cut out of frames, and what was before it."""
 
-import math
-from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 SMALLEST = 1e-30  # counts; the least noise that anything is divided by
-MOST_BEFORE = 64  # contacts that are remembered: more in ten seconds say nothing new
 QUIET_S = 10.0  # a contact further ago says nothing of the next one
 
 
@@ -70,28 +67,3 @@ class Segment:
     def offset(self) -> float:
         """Time of the last touched frame in seconds."""
         return float(self.times[self.last])
-
-
-class Past:
-    """The contacts of the last ten seconds."""
-
-    def __init__(self) -> None:
-        self._began: deque[float] = deque(maxlen=MOST_BEFORE)  # s
-        self._ended = -math.inf  # s, the last contact's end
-        self._length_s = 0.0  # of the last contact
-
-    def begin(self, t: float, covered: float, rest: float) -> Before:
-        """A contact begins at `t` s on a sensor on which something rests (`Before`): what was before it."""
-        began = self._began
-        while began and t - began[0] > QUIET_S:
-            began.popleft()
-        quiet_s = min(t - self._ended, QUIET_S)
-        before = Before(quiet_s, len(began), self._length_s if quiet_s < QUIET_S else 0.0, covered, rest)
-        began.append(t)
-        return before
-
-    def end(self, t: float) -> None:
-        """The contact is over at `t` s, or what had rested has left then."""
-        self._ended = t
-        if self._began:
-            self._length_s = max(t - self._began[-1], 0.0)

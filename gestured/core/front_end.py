@@ -1,7 +1,8 @@
 """One sensor's way from frame to segment: frames in, what was found in them out.
 
 A front end knows neither its sensor's name nor who asks. Of each contact it gives `Opened`, then one of `Cut` and
-`Void`, and at last `Ended`; and `Shown` where the finger may have left.
+`Void`, and at last `Ended`; and a `Segment` where the finger may have left:
+that is what will be cut if it stays off, so that its name may be looked for meanwhile.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import Cutter
-from gestured.core.frames import Frame, Past, Segment
+from gestured.core.frames import Frame, Segment
 from gestured.core.mounting import Mounting
 from gestured.core.segmenter import IDLE, Action, Deed, Segmenter
 from gestured.core.settling import PATIENCE_S
@@ -29,16 +30,10 @@ class Opened(NamedTuple):
     onset: float  # s
 
 
-class Shown(NamedTuple):
-    """A segment as it will be cut if the finger stays off; its name may be looked for meanwhile."""
-
-    segment: Segment
-
-
 class Cut(NamedTuple):
     """A segment that is complete and waits for its name."""
 
-    segment: Segment  # the object that `Shown` held last, unless a taxel has turned out to be bad since
+    segment: Segment  # the object that was given before it, unless a taxel has turned out to be bad since
     decided: float  # s, when it was complete
     hole_s: float  # the longest time until then in which the finger may have done anything unseen
 
@@ -55,7 +50,7 @@ class Ended(NamedTuple):
     offset: float  # s
 
 
-Found = Opened | Shown | Cut | Void | Ended
+Found = Opened | Segment | Cut | Void | Ended
 
 
 class FrontEnd:
@@ -86,7 +81,6 @@ class FrontEnd:
         self.calm = False
         self.kind = (rows, columns, *astuple(self.mounting))
         self.pace = Pace()
-        self._past = Past()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
         self._lowest = np.zeros(0)  # (N,) counts, the lowest since then
 
@@ -116,18 +110,9 @@ class FrontEnd:
         return self.conditioner.taxels.count
 
     @property
-    def interval_s(self) -> float:
-        """Seconds from frame to frame as they come, 0 before it is known."""
-        return self.pace.interval_s
-
-    @property
     def rate_hz(self) -> float:
         """Frames a second as they come, 0 before it is known."""
-        return 1.0 / self.interval_s if self.interval_s > 0 else 0.0
-
-    def levels(self, t: float) -> tuple[str, tuple[float, float]]:
-        """The segmenter's phase at `t` s, and the activity (noise units) that is strong then, and not quiet."""
-        return self.segmenter.phase.name, self.segmenter.levels(t)
+        return 1.0 / self.pace.interval_s if self.pace.interval_s > 0 else 0.0
 
     def push(self, frame: Frame) -> list[Found]:
         """Take one frame, give all that was found, in order.
@@ -143,14 +128,14 @@ class FrontEnd:
         self.last_sent, self.look, self.calm = frame.values, None, False
         if not conditioner.idle.known:
             if conditioner.settle(t, raw):
-                cutter.settled(t)
+                cutter.settled = t  # the idle sensor has been watched until then
             return found
         if t >= conditioner.idle.glance and conditioner.idle.mistaken(t, raw) and segmenter.phase.pending:
-            return found + self._restart(keep=False)
+            return found + self.reset()
         self.look = look = conditioner.look(t, raw, segmenter.after)
         if conditioner.idle.bare is not None and (bared := conditioner.unloaded(look, segmenter.after)) is not None:
             found += self._left()
-            self._past.end(t)
+            self.cutter.end(t)
             self.look = look = bared
         if look.shifted:
             return found + self._shift(look)
@@ -165,7 +150,7 @@ class FrontEnd:
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
-            rests = conditioner.wide(look) or t - segmenter.rests_since >= PATIENCE_S
+            rests = conditioner.wide(look) or t - segmenter.rests.began >= PATIENCE_S
             if conditioner.settle(t, raw, rests=True, restless=rests):  # what stays becomes the baseline's
                 found += self._void("held")
         else:
@@ -177,7 +162,7 @@ class FrontEnd:
     def _pressed(self, look: Look) -> Sequence[Found]:
         """A frame of a contact whose answer is open."""
         segmenter = self.segmenter
-        if len(self.cutter) > self.timing.limit_frames:
+        if len(self.cutter.kept) > self.timing.limit_frames:
             return self.give_up(look.t)
         self.conditioner.touched(look)
         flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
@@ -185,11 +170,11 @@ class FrontEnd:
             if self.conditioner.settle(look.t, look.raw, rests=True, restless=True):
                 return self._void("held")  # an arm that lies still is no gesture, and something else may be
         else:
-            self.conditioner.idle.unsettle()
+            self.conditioner.idle.settling.clear()
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
             return ()
         segment = self.cutter.draft(segmenter.onset, segmenter.last_touched)
-        return () if segment is None else (Shown(segment),)
+        return () if segment is None else (segment,)
 
     @property
     def due(self) -> float | None:
@@ -212,12 +197,8 @@ class FrontEnd:
 
     def so_far(self) -> Segment | None:
         """All that has come of the contact that goes on; None where nothing is left of it without its bad taxels."""
-        segment = self.cutter.so_far(self.segmenter.onset, self.segmenter.last_touched)
+        segment, _ = self.cutter.segment(self.segmenter.onset, self.segmenter.last_touched)
         return segment if segment.frames.max() >= self.segmenter.off * segment.noise else None
-
-    def hole(self, segment: Segment, t: float) -> float:
-        """The longest time in s in which a finger may have done anything unseen, from before a segment to `t` s."""
-        return self.cutter.hole(segment.onset, segment.offset, t)
 
     def give_up(self, t: float) -> list[Found]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
@@ -245,9 +226,15 @@ class FrontEnd:
             self.look = self.look._replace(raw=self.look.raw.copy(), above=self.look.above.copy())
         return found
 
-    def reset(self) -> list[Found]:
-        """The sensor restarted: start clean and learn the idle sensor anew; an open contact is cancelled."""
-        return self._restart(keep=False)
+    def reset(self, *, keep: bool = False, shown: NDArray[np.float64] | None = None) -> list[Found]:
+        """The sensor restarted: start clean and learn the idle sensor anew; an open contact is cancelled.
+
+        `keep`: frames that were offered as idle still count. `shown` counts stand for the baseline until then.
+        """
+        found = self._void("restart")
+        self.conditioner.idle.forget(keep=keep, shown=shown)
+        self._below_since, self.calm = None, False
+        return found
 
     def _pass(self, t: float) -> list[Found]:
         """Time passes until a frame at `t` s: what that alone decides. A frame cannot join what is over."""
@@ -271,7 +258,7 @@ class FrontEnd:
         self._lowest = np.minimum(self._lowest, look.raw)
         leaving = self.conditioner.idle.bare is not None  # then `unloaded` will know the sensor when it has left
         if look.t - self._below_since >= (self.timing.stale_s if leaving else self.timing.shift_s):
-            found = self._restart(keep=True, shown=self._lowest)
+            found = self.reset(keep=True, shown=self._lowest)
         self.conditioner.settle(look.t, look.raw)
         return found
 
@@ -279,22 +266,15 @@ class FrontEnd:
         """What rested on the sensor and was learned has left; a contact that was open was its own, and is held."""
         found = self._cancel("held") if self.touched else []
         self.segmenter.phase = IDLE
-        self.cutter.clear()
+        self.cutter.kept.clear()
         self._forget_rubbish()
-        return found
-
-    def _restart(self, *, keep: bool, shown: NDArray[np.float64] | None = None) -> list[Found]:
-        """Start clean. `keep`: frames offered as idle still count; `shown` counts stand for the baseline until then."""
-        found = self._void("restart")
-        self.conditioner.idle.forget(keep=keep, shown=shown)
-        self._below_since, self.calm = None, False
         return found
 
     def _void(self, reason: str) -> list[Found]:
         """The idle sensor is another one from here on: a contact that goes on is over, and nothing is left of it."""
         found = self._cancel(reason) if self.touched else []
         self.segmenter.reset()
-        self.cutter.clear()
+        self.cutter.kept.clear()
         return found
 
     def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
@@ -304,7 +284,7 @@ class FrontEnd:
             if action is Action.OPEN:
                 found.append(self._open(onset))
             elif action is Action.RISE:
-                self._past.end(onset)
+                self.cutter.end(onset)
                 self._begin(onset)
             elif action is Action.HELD:
                 found.append(Void("held"))
@@ -322,21 +302,21 @@ class FrontEnd:
         return Opened(onset)
 
     def _begin(self, onset: float) -> None:
-        self.cutter.begin(self._past.begin(onset, *self.conditioner.resting()))
+        self.cutter.begin(onset, *self.conditioner.resting())
         self.conditioner.taxels.flickering.begin(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Void("glitch"), self._end(offset)]
-        made = self.cutter.cut(onset, offset)
-        nothing = made.peak < self.segmenter.off * made.segment.noise  # is left without its bad taxels
+        segment = self.cutter.cut(onset, offset)
+        nothing = float(segment.frames.max()) < self.segmenter.off * segment.noise  # is left without its bad taxels
         if self._forget_rubbish() or nothing:
             return [Void("stuck"), self._end(offset)]
-        return [Cut(made.segment, t, self.cutter.hole(onset, offset, seen)), self._end(offset)]
+        return [Cut(segment, t, self.cutter.hole(onset, offset, seen)), self._end(offset)]
 
     def _end(self, offset: float) -> Ended:
-        self._past.end(offset)
+        self.cutter.end(offset)
         return Ended(offset)
 
     def _forget_rubbish(self) -> bool:

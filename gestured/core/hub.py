@@ -10,9 +10,11 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
+from typing import Any
 
 from gestured.core import bank
-from gestured.core.beside.reading import Reading, View
+from gestured.core.beside.reading import Reading
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
 from gestured.core.facts import Changed, Dropped, Fact, Fault
@@ -42,11 +44,13 @@ class Hub:
         self._missed = 0  # times that this machine had no room for a packet
         self._missed_read = 0  # what `_missed` was when packets were read last
         self._missed_before: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
-        self._owners: frozenset[Source] = frozenset()
+        # Sources that own a sensor and were heard within the last minute, as of the last tick.
+        self.owners: frozenset[Source] = frozenset()
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._ticked = -math.inf  # s, the last tick
-        self._due = math.inf  # s, when the first contact of all sensors may be over
+        # When `wait` will probably find something unless packets come before; infinite where there is nothing.
+        self.due = math.inf
         self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
         self._later = later
         self._armed: dict[str, float] = {}  # sensors that come armed, until so many s on this clock
@@ -54,21 +58,6 @@ class Hub:
         self.asks: dict[str, Sensor] = {}  # sensors that wait for `ask`, the one that has waited longest first
         self.looks: dict[str, Sensor] = {}  # the same for `look`
         self._set(scene, classifier)
-
-    @property
-    def scene(self) -> Scene:
-        """The scene that decides now."""
-        return self._scene
-
-    @property
-    def due(self) -> float:
-        """When `wait` will probably find something unless packets come before; infinite where there is nothing."""
-        return self._due
-
-    @property
-    def owners(self) -> frozenset[Source]:
-        """Sources that own a sensor and were heard within the last minute, as of the last tick."""
-        return self._owners
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
@@ -85,7 +74,7 @@ class Hub:
             due = sensor.receive(arrivals, now, facts, missed=self._missed_before[name] != self._missed)
             self._missed_before[name] = self._missed
             if due < math.inf:
-                self._waits[name], self._due = sensor, min(self._due, due)
+                self._waits[name], self.due = sensor, min(self.due, due)
             if sensor.shown is not None:
                 self.asks[name] = sensor
             if (self._foreseen is None or self._foreseen) and sensor.looks:
@@ -100,7 +89,7 @@ class Hub:
         self, packets: Sequence[tuple[bytes, Source]], now: float, facts: list[Fact], *, together: bool
     ) -> dict[str, list[Arrival]]:
         """The frames of packets, by the names of the sensors that they may feed, without those that banks take."""
-        if self._scene.allow:
+        if self.scene.allow:
             facts += [Dropped("not_allowed", source) for _, source in packets if not self._may_send(source[0])]
             packets = [packet for packet in packets if self._may_send(packet[1][0])]
         found: dict[int, list[Arrival]] = {}
@@ -127,13 +116,13 @@ class Hub:
     def wait(self, now: float) -> list[Fact]:
         """No packets have come until `now`: contacts may be over."""
         facts: list[Fact] = []
-        if now >= self._due:
+        if now >= self.due:
             for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.elapses_at):
                 sensor.elapse(now, facts)
             self.looks |= {name: sensor for name, sensor in self._waits.items() if sensor.looks}
             due = {name: sensor.elapses_at for name, sensor in self._waits.items()}
             self._waits = {name: sensor for name, sensor in self._waits.items() if due[name] < math.inf}
-            self._due = min(due.values(), default=math.inf)
+            self.due = min(due.values(), default=math.inf)
         return facts
 
     def ask(self, now: float) -> list[Fact]:
@@ -166,7 +155,7 @@ class Hub:
         sensors = self._sensors.values()
         self._banks.show()
         self._ticked = now
-        self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
+        self.owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
             sensor.review(now, facts)
             if not sensor.silent and sensor.stale(now):
@@ -245,7 +234,7 @@ class Hub:
         return facts
 
     def _follows(self, name: str) -> bool:
-        return self._scene.touch and (self._followed is None or name in self._followed)
+        return self.scene.touch and (self._followed is None or name in self._followed)
 
     def number(self, name: str) -> tuple[int, int]:
         """The next sequence and id of a sensor, for an event that is made up; they count as used."""
@@ -257,23 +246,23 @@ class Hub:
 
     def sequences(self) -> dict[str, int]:
         """The last sequence of each sensor that was heard, or tested."""
-        numbers = self._numbers | {name: sensor.numbers for name, sensor in self._sensors.items()}
-        return {name: sequence for name, (sequence, _) in numbers.items()}
+        gone = {name: sequence for name, (sequence, _) in self._numbers.items()}
+        return gone | {name: sensor.sequence for name, sensor in self._sensors.items()}
 
     def knows(self, sensor: str) -> bool:
         """Whether a sensor was heard, or is in the scene: whether it has a reading."""
-        return sensor in self._sensors or sensor in self._scene.sensors
+        return sensor in self._sensors or sensor in self.scene.sensors
 
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
-        silent = {name: self._unheard(name, now) for name in self._scene.sensors}
+        silent = {name: self._unheard(name, now) for name in self.scene.sensors}
         return silent | {
             name: sensor.reading(self._as_of(sensor, now)) for name, sensor in tuple(self._sensors.items())
         }
 
     def states(self, now: float) -> dict[str, str]:
         """The state of each sensor that `readings` has, at a fraction of the price."""
-        silent = dict.fromkeys(self._scene.sensors, "no_data")
+        silent = dict.fromkeys(self.scene.sensors, "no_data")
         return silent | {name: sensor.condition(self._as_of(sensor, now))[0] for name, sensor in self._sensors.items()}
 
     def _as_of(self, sensor: Sensor, now: float) -> float:
@@ -283,22 +272,22 @@ class Hub:
     def listening(self, now: float) -> list[Gate]:
         """What gates and arming say at `now`, of the sensors of which they say anything."""
         heard = dict(self._sensors)
-        unheard = [self._unheard(name, now).gate for name in self._scene.sensors if name not in heard]
+        unheard = [self._unheard(name, now).gate for name in self.scene.sensors if name not in heard]
         told = [*unheard, *(sensor.listens(now) for sensor in heard.values())]
         return [gate for gate in told if gate is not None and (gate.closed or gate.armed is not None)]
 
-    def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
-        """A sensor as it is felt now, and what is known of it; None where it was not heard."""
+    def view(self, name: str, now: float, *, raw: bool) -> dict[str, Any] | None:
+        """A sensor as it is felt at `now`, as JSON values; None where it was not heard."""
         sensor = self._sensors.get(name)
-        if sensor is not None:
-            self._leave(sensor, now, [])
-        found = None if sensor is None else sensor.view(raw=raw)
-        return None if sensor is None or found is None else (found, sensor.reading(now))
+        if sensor is None:
+            return None
+        self._leave(sensor, now, [])
+        return sensor.view(now, raw=raw)
 
     def _unheard(self, name: str, now: float) -> Reading:
-        listening = Listening(self._scene.arming_of(name))
+        listening = Listening(self.scene.arming_of(name))
         listening.gate(self.gates.of(name), now)
-        return Reading("no_data", self._scene.grid_of(name), gate=listening.told(name, now, -math.inf))
+        return Reading("no_data", self.scene.grid_of(name), gate=listening.told(name, now, -math.inf))
 
     def _lapse(self, now: float) -> list[Fact]:
         """Open the gates that open by themselves until now."""
@@ -316,9 +305,9 @@ class Hub:
         if missing:
             known = ", ".join(classifier.gestures)
             raise ValueError(f"gestures: {', '.join(missing)} were asked for, the classifier knows {known}")
-        self._scene, self._classifier = scene, classifier
+        self.scene, self._classifier = scene, classifier  # that decide from now on
         self._decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=scene.touches)
-        self._allowed: dict[str, bool] = {}  # by host
+        self._may_send = lru_cache(HOSTS)(scene.may_send)
         self._full_until = -math.inf  # s; before that no stranger has been silent for long enough to lose its place
 
     def _together(self, packets: Sequence[tuple[bytes, Source]], facts: list[Fact]) -> list[Block]:
@@ -339,21 +328,13 @@ class Hub:
             facts.append(Dropped(wrong.reason, source, text=str(wrong)))
         return arrivals
 
-    def _may_send(self, host: str) -> bool:
-        known = self._allowed.get(host)
-        if known is None:
-            if len(self._allowed) >= HOSTS:
-                self._allowed.clear()
-            known = self._allowed[host] = self._scene.may_send(host)
-        return known
-
     def _admits(self, name: str, source: Source, now: float, facts: list[Fact]) -> bool:
         """Whether a `source` that has sent a frame may feed that sensor, which then is out of its bank."""
         sensor = self._sensors.get(name) or self._new(name, source, now, facts)
         if sensor is None:
             return False
         self._leave(sensor, now, facts)
-        if not sensor.owner.admits(source, now, self._scene.stale_s):
+        if not sensor.owner.admits(source, now, self.scene.stale_s):
             facts.append(Dropped("second_source", source))
             return False
         sensor.silent = False
@@ -376,7 +357,7 @@ class Hub:
             facts.append(Dropped("too_many_sensors", source))
             return None
         numbers = self._numbers.pop(name, (0, 0))
-        sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
+        sensor = self._sensors[name] = Sensor(name, self.scene, self._classifier, source, numbers)
         sensor.foresee(asked=self.foreseen(name), later=self._later)
         sensor.follow(facts, asked=self._follows(name))
         self._missed_before[name] = self._missed
@@ -389,14 +370,14 @@ class Hub:
 
         One packet can hold hundreds of names: where there is no place, they are not each held against all sensors.
         """
-        named = self._scene.sensors
+        named = self.scene.sensors
         if name in named:
             return False
         if now <= self._full_until:
             return True
         self._banks.show()
         strangers = [sensor for sensor in self._sensors.values() if sensor.name not in named]
-        if len(strangers) < self._scene.max_sensors - len(named):
+        if len(strangers) < self.scene.max_sensors - len(named):
             return False
         longest = min(strangers, key=lambda sensor: sensor.owner.heard, default=None)
         if longest is None or now - longest.owner.heard <= FORGET_S:
@@ -414,4 +395,4 @@ class Hub:
         self.looks.pop(sensor.name, None)
         if len(self._numbers) >= REMEMBERED:
             self._numbers.pop(next(iter(self._numbers)))
-        self._numbers[sensor.name] = sensor.numbers
+        self._numbers[sensor.name] = sensor.sequence, sensor.segments

@@ -4,7 +4,6 @@ That is learned from a second in which nothing moved, then followed while the se
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +26,6 @@ GLANCE_S = 0.19  # the pause between two glances at how much frames move
 GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # of a quieter frame, of a repeated one; the sum that puts it in doubt
 
 
-class Bare(NamedTuple):
-    """What the sensor showed before something was laid on it that has since become part of the baseline."""
-
-    counts: Array  # (N,)
-    sigma: Array  # (N,) counts, each taxel's standard deviation
-
-
 class Idle:
     """What one sensor shows while nobody touches it, and how much it moves.
 
@@ -50,9 +42,9 @@ class Idle:
         self.provisional = False  # whether what was learned is in doubt, and the next stable second replaces it
         self.glance = math.inf  # s, when `mistaken` is to be asked next
         self.smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
-        self.bare: Bare | None = None  # what the sensor showed before something was laid on it that was learned
-        self._settling = Settling()
-        self.offered = False  # whether `settle` was offered a frame since `unsettle`
+        # `counts` and `sigma` before something was laid on the sensor that has since become part of the baseline.
+        self.bare: tuple[Array, Array] | None = None
+        self.settling = Settling()  # the frames that `settle` was offered
         self.followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self.reviewed = 0.0  # s, when the noise was last looked at
         self.learned = 1.0  # counts, `level` as it was learned
@@ -64,15 +56,16 @@ class Idle:
 
         `rests`: something lies there that was not when it was learned; `restless`: it may never lie still.
         """
-        self.offered = True
-        learned = self._settling.push(t, raw, patience=restless or not self.known)
+        learned = self.settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:
-            bare = Bare(self.counts, self.sigma) if rests and self.bare is None else self.bare
-            if (
-                bare is not None and not self.known
-            ):  # the bare sensor was seen for a moment: what all taxels share is drift
-                bare = Bare(bare.counts + max(quantile(learned.baseline - bare.counts, SHARED), 0.0), bare.sigma)
-            self.bare = bare if bare is not None and _loaded(learned.baseline, bare) else None
+            bare = (self.counts, self.sigma) if rests and self.bare is None else self.bare
+            if bare is not None:
+                counts, sigma = bare
+                if not self.known:  # the bare sensor was seen for a moment: what all taxels share is drift
+                    counts = counts + max(quantile(learned.baseline - counts, SHARED), 0.0)
+                lies = (learned.baseline - counts > LOADED * sigma).any()
+                bare = (counts, sigma) if lies else None
+            self.bare = bare
             self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
             self.followed = self.reviewed = t
@@ -81,11 +74,6 @@ class Idle:
             self.quieter, self.learned = 0, self.level
             self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf  # what moves, moves by a step
         return learned
-
-    def unsettle(self) -> None:
-        """Forget the frames that `settle` was offered: there is no need, or the sensor is touched."""
-        self._settling.clear()
-        self.offered = False
 
     @property
     def doubtful(self) -> bool:
@@ -143,19 +131,17 @@ class Idle:
         self.reviewed = t
         return True
 
-    def hold(self) -> None:
-        """The sensor is touched: what passes now is not followed."""
-        self.followed = None
-
     def doubt(self) -> None:
         """Put what was learned in doubt: it holds until the next stable second replaces it."""
         self.provisional, self.followed = True, None
 
-    def unload(self, bare: Bare, raw: Array) -> None:
+    def unload(self, raw: Array) -> None:
         """What rested has left, as (N,) counts show: the sensor is as it was before, until the next stable second."""
-        self.counts, self.bare = np.minimum(bare.counts, raw), None
-        self._set(bare.sigma)
-        self._settling.clear()
+        assert self.bare is not None
+        (counts, sigma), self.bare = self.bare, None
+        self.counts = np.minimum(counts, raw)
+        self._set(sigma)
+        self.settling.clear()
         self.doubt()
 
     def forget(self, *, keep: bool, shown: Array | None = None) -> None:
@@ -164,10 +150,10 @@ class Idle:
         `shown` (N,) counts: what the sensor shows meanwhile, if a hand may come before it is learned.
         """
         self.known = self.provisional = False
-        self.bare = None if shown is None else Bare(shown, (self.bare or self).sigma)
+        self.bare = None if shown is None else (shown, self.sigma if self.bare is None else self.bare[1])
         self.followed = None
         if not keep:
-            self._settling.clear()
+            self.settling.clear()
 
     def _set(self, sigma: Array) -> None:
         self.sigma = sigma
@@ -190,8 +176,3 @@ def glances(changes: Array, learned: Array, lively: Array, quieter: Array) -> Ar
 def seen(above: Array, sigma: Array) -> Array:
     """(..., N) counts, the noise of each taxel as one frame shows it; `sigma`: the noise so far."""
     return np.minimum(np.abs(above), OUTLIER * sigma) * SIGMA_PER_DEVIATION
-
-
-def _loaded(baseline: Array, bare: Bare) -> bool:
-    """Whether (N,) counts of a stable second show that something still lies on the sensor."""
-    return bool((baseline - bare.counts > LOADED * bare.sigma).any())

@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gate, Gesture, Provisional, Status, Touch, Unknown, Where
+from gestured.core.events import Event, Gesture, Provisional, Status, Touch, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
@@ -55,13 +55,7 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
             line[name] = value + epoch if is_time and value is not None else value
     if test:
         line["test"] = True
-    return _line(line)
-
-
-def listening(gates: Sequence[Gate], epoch: float) -> dict[str, dict[str, Any]]:
-    """What hello and status tell of sensors that a gate silences, or that a gesture arms; by their names."""
-    until = {gate.sensor: None if gate.until is None else gate.until + epoch for gate in gates}
-    return {g.sensor: {"armed": g.armed, "closed": g.closed, "until": until[g.sensor]} for g in gates}
+    return json_line(line)
 
 
 def hello_json(  # noqa: PLR0913 - each is a key of the line
@@ -72,8 +66,8 @@ def hello_json(  # noqa: PLR0913 - each is a key of the line
     sensors: Mapping[str, int],
     gates: Mapping[str, Mapping[str, Any]],
 ) -> bytes:
-    """The first line to a client; `sensors` has the last sequence of each, `gates` what `listening` gives."""
-    return _line(
+    """The first line to a client; `sensors` has the last sequence of each, `gates` what gates and arming say."""
+    return json_line(
         {
             "type": "hello",
             "protocol": 1,
@@ -89,17 +83,17 @@ def hello_json(  # noqa: PLR0913 - each is a key of the line
 
 def gestures_json(gestures: Sequence[str]) -> bytes:
     """Tells every client which gestures there are from now on, the user's own after the model's."""
-    return _line({"type": "gestures", "gestures": list(gestures)})
+    return json_line({"type": "gestures", "gestures": list(gestures)})
 
 
 def lost_json(count: int) -> bytes:
     """Tells a client how many lines it was too slow for."""
-    return _line({"type": "lost", "count": count})
+    return json_line({"type": "lost", "count": count})
 
 
 def error_json(reason: str) -> bytes:
     """Tells a client what was wrong with its request."""
-    return _line({"type": "error", "reason": reason})
+    return json_line({"type": "error", "reason": reason})
 
 
 def quoted(value: object) -> str:
@@ -108,7 +102,8 @@ def quoted(value: object) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def _line(value: dict[str, Any]) -> bytes:
+def json_line(value: Mapping[str, Any]) -> bytes:
+    """An object as a line of one of the daemon's sockets. Raises ValueError for a NaN or an infinity."""
     return _ENCODER.encode(value).encode() + b"\n"
 
 

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 Strictness = Literal["eager", "normal", "strict"]
 STRICTNESS: tuple[Strictness, ...] = get_args(Strictness)
 USUAL: Strictness = "normal"
+Curve = tuple[tuple[float, float, float], ...]  # threshold of all gestures alike, share missed, false an hour
 Needed = tuple[float | None, ...]  # confidences, one for each stretch of elapsed time; None is never
 
 
@@ -19,15 +20,6 @@ class Point:
     missed: float  # share of the gestures that were meant
     false_per_hour: float
     hours: float  # that were judged
-
-
-@dataclass(frozen=True, slots=True)
-class OperatingPoints:
-    """A point for each strictness, and the curve that they lie on."""
-
-    points: Mapping[str, Point]  # by strictness
-    # Threshold of all gestures alike, share missed, false an hour; thresholds rise.
-    curve: tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)

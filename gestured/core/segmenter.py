@@ -26,13 +26,14 @@ from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function
 from typing import NamedTuple
 
 from gestured.core.activity import hardly_ever, rarely
-from gestured.core.contact import ON_SHARE, Centroid, Memory, Stretch
+from gestured.core.contact import ON_SHARE, AfterEffect, Centroid, Stretch
 from gestured.core.timing import Timing
 
 FAINT = 4.0  # times `on`: up to that activity something may lie on the sensor and be no gesture: the edge of an arm
 RISE = 2.5  # times the activity of what lies there: a contact that becomes so active is a finger beside it
 SWAY = 1.25  # times the activity of what lies there: it may grow so far, and still the finger counts as off
 TREMBLES = 0.5  # of the way that a tap may move: a contact that was given up and moves further is a finger, not a thing
+SPAN_S = 0.15  # the length of a span; of three spans it is remembered how strongly the contact was pressed
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 
 
@@ -64,104 +65,104 @@ class Action(IntEnum):
 # --- levels of activity in each phase: a frame is strong from the first on, and quiet below the second
 
 
-def _untouched(memory: Memory, t: float) -> tuple[float, float]:
+def _untouched(segmenter: "Segmenter", t: float) -> tuple[float, float]:
     """Levels while nobody touches: a new contact has to exceed what the last one has left behind."""
-    return memory.on + memory.after.level(t), memory.off
+    return segmenter.on + segmenter.after.level(t), segmenter.off
 
 
-def _touched(memory: Memory, t: float) -> tuple[float, float]:
+def _touched(segmenter: "Segmenter", t: float) -> tuple[float, float]:
     """A finger is off below a share of its own peak, and back above a larger one: hysteresis.
 
     Where something faint lies there as well, the shares are of what the finger adds to its activity.
     """
-    under = memory.under
-    risen = memory.after.peak - under
-    strong = max(memory.on, under + ON_SHARE * risen)
-    return strong, min(strong, max(memory.off, SWAY * under + OFF_SHARE * risen))
+    under = segmenter.under
+    risen = segmenter.after.peak - under
+    strong = max(segmenter.on, under + ON_SHARE * risen)
+    return strong, min(strong, max(segmenter.off, SWAY * under + OFF_SHARE * risen))
 
 
-def _given_up(memory: Memory, t: float) -> tuple[float, float]:
+def _given_up(segmenter: "Segmenter", t: float) -> tuple[float, float]:
     """Levels of a contact that was given up: whatever reaches `off` counts as touched, so that nothing is weak."""
-    return memory.off, memory.off
+    return segmenter.off, segmenter.off
 
 
 # --- what the end of a wait says
 
 
-def _released(memory: Memory) -> Signal:
+def _released(segmenter: "Segmenter") -> Signal:
     """The finger was off for `release_s`; after a single tap a second one may follow."""
-    waits = memory.wait_for_double_tap and memory.first is None and memory.tap_so_far()
+    waits = segmenter.waits and segmenter.first is None and segmenter.tap_so_far()
     return Signal.TAPPED if waits else Signal.RELEASED
 
 
 # --- what is remembered of a frame; each function may return a signal that follows from it
 
 
-def _begin(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
+def _begin(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> Signal | None:
     """The first contact of a segment begins."""
-    memory.after.begin()
-    memory.first = None
-    memory.rise(t)
-    return _press(memory, t, activity, place)
+    segmenter.after.begin()
+    segmenter.first = None
+    segmenter.rise(t)
+    return _press(segmenter, t, activity, place)
 
 
-def _again(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
+def _again(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> Signal | None:
     """The second contact of a segment begins."""
-    memory.first, memory.contact = memory.contact, Stretch(t)
-    return _press(memory, t, activity, place)
+    segmenter.first, segmenter.contact = segmenter.contact, Stretch(t)
+    return _press(segmenter, t, activity, place)
 
 
-def _press(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
+def _press(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> Signal | None:
     """Remember a strong frame: its activity, and its centroid."""
-    rose = _touch(memory, t, activity)
+    rose = _touch(segmenter, t, activity)
     if place is not None:
-        memory.contact.follow(place)
-    return rose or _moved(memory)
+        segmenter.contact.follow(place)
+    return rose or _moved(segmenter)
 
 
-def _graze(memory: Memory, t: float, activity: float, place: Centroid | None) -> Signal | None:
+def _graze(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> Signal | None:
     """A frame that is pressed weakly."""
-    return _touch(memory, t, activity) or _moved(memory)
+    return _touch(segmenter, t, activity) or _moved(segmenter)
 
 
-def _touch(memory: Memory, t: float, activity: float) -> Signal | None:
-    rose, lay = None, memory.lately.before(t, activity)
-    if memory.first is None:
-        if memory.after.peak < OFF_SHARE * activity:
-            memory.rise(t)  # what came before was too faint to belong to it: a hover, or noise
-        elif 0 < lay <= FAINT * memory.on and activity >= RISE * lay:
+def _touch(segmenter: "Segmenter", t: float, activity: float) -> Signal | None:
+    rose, lay = None, segmenter.lately(t, activity)
+    if segmenter.first is None:
+        if segmenter.after.peak < OFF_SHARE * activity:
+            segmenter.rise(t)  # what came before was too faint to belong to it: a hover, or noise
+        elif 0 < lay <= FAINT * segmenter.on and activity >= RISE * lay:
             rose = Signal.ROSE
-            memory.after.begin()
-            memory.rise(t, lay)  # a finger beside something faint, such as the edge of an arm that has shifted
-    memory.after.touch(activity)
-    memory.contact.touched = t
-    memory.quiet_since = None
+            segmenter.after.begin()
+            segmenter.rise(t, lay)  # a finger beside something faint, such as the edge of an arm that has shifted
+    segmenter.after.touch(activity)
+    segmenter.contact.touched = t
+    segmenter.quiet_since = None
     return rose
 
 
-def _moved(memory: Memory) -> Signal | None:
-    return Signal.MOVED if memory.first is not None and not memory.tap_so_far() else None
+def _moved(segmenter: "Segmenter") -> Signal | None:
+    return Signal.MOVED if segmenter.first is not None and not segmenter.tap_so_far() else None
 
 
-def _quiet(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
+def _quiet(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> None:
     """The first quiet frame is the one from which the waits count."""
-    if memory.quiet_since is None:
-        memory.quiet_since = t
+    if segmenter.quiet_since is None:
+        segmenter.quiet_since = t
 
 
-def _lie(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
+def _lie(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> None:
     """What was given up still lies there."""
-    memory.quiet_since = None
-    memory.contact.touched = t
+    segmenter.quiet_since = None
+    segmenter.contact.touched = t
     if place is not None:
-        memory.rests.follow(place)
-    if memory.rests.widest > TREMBLES * memory.travel:
-        memory.rests = Stretch(t)  # a finger that goes on moving does not lie there
+        segmenter.rests.follow(place)
+    if segmenter.rests.widest > TREMBLES * segmenter.travel:
+        segmenter.rests = Stretch(t)  # a finger that goes on moving does not lie there
 
 
-def _part(memory: Memory, t: float, activity: float, place: Centroid | None) -> None:
+def _part(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> None:
     """The second contact is a segment of its own."""
-    memory.first = None
+    segmenter.first = None
 
 
 # --- the phases and the table
@@ -172,60 +173,54 @@ class Phase:
     """What is true of the sensor, and how frames and waits are read while it is."""
 
     name: str
-    levels: Callable[[Memory, float], tuple[float, float]]  # strong from the first on, quiet below the other
+    levels: Callable[["Segmenter", float], tuple[float, float]]  # strong from the first on, quiet below the other
     wait: str = ""  # the name in `Timing` of the seconds of quiet after which time alone decides
-    says: Callable[[Memory], Signal] | None = None  # what the end of that wait says
+    says: Callable[["Segmenter"], Signal] | None = None  # what the end of that wait says
     touched: bool = True  # a contact goes on, given up or not
     pending: bool = True  # the contact goes on and may still become a segment
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
 
-    def reads(self, memory: Memory, t: float, activity: float) -> Signal:
+    def reads(self, segmenter: "Segmenter", t: float, activity: float) -> Signal:
         """What a frame at `t` s says by its activity, in noise units."""
-        strong, quiet = self.levels(memory, t)
+        strong, quiet = self.levels(segmenter, t)
         return Signal.QUIET if activity < quiet else Signal.STRONG if activity >= strong else Signal.WEAK
 
 
 IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
 CONTACT = Phase("CONTACT", _touched)
 RELEASING = Phase("RELEASING", _touched, "release_s", _released, let_go=True)
-GAP = Phase("GAP", _touched, "tap_gap_s", lambda memory: Signal.GAP_OVER, let_go=True)
-SPENT = Phase("SPENT", _given_up, "release_s", lambda memory: Signal.RELEASED, pending=False)
+GAP = Phase("GAP", _touched, "tap_gap_s", lambda segmenter: Signal.GAP_OVER, let_go=True)
+SPENT = Phase("SPENT", _given_up, "release_s", lambda segmenter: Signal.RELEASED, pending=False)
 
 
-class Row(NamedTuple):
-    """What follows when a signal comes in a phase."""
-
-    then: Phase
-    action: Action | None = None
-    remember: Callable[[Memory, float, float, Centroid | None], Signal | None] | None = None
-
-
+# What follows when a signal comes in a phase: the next phase, what the front end does, and what is remembered.
+Row = tuple[Phase, Action | None, Callable[["Segmenter", float, float, Centroid | None], Signal | None] | None]
 S, A = Signal, Action
 TRANSITIONS: dict[tuple[Phase, Signal], Row] = {
-    (IDLE, S.QUIET): Row(IDLE),
-    (IDLE, S.WEAK): Row(IDLE),
-    (IDLE, S.STRONG): Row(CONTACT, A.OPEN, _begin),
-    (CONTACT, S.QUIET): Row(RELEASING, None, _quiet),
-    (CONTACT, S.WEAK): Row(CONTACT, None, _graze),
-    (CONTACT, S.STRONG): Row(CONTACT, None, _press),
-    (CONTACT, S.ROSE): Row(CONTACT, A.RISE),
-    (CONTACT, S.MOVED): Row(CONTACT, A.SPLIT, _part),
-    (CONTACT, S.LIMIT): Row(SPENT, A.HELD),
-    (RELEASING, S.QUIET): Row(RELEASING),
-    (RELEASING, S.WEAK): Row(RELEASING),
-    (RELEASING, S.STRONG): Row(CONTACT, None, _press),
-    (RELEASING, S.RELEASED): Row(IDLE, A.CLOSE),
-    (RELEASING, S.TAPPED): Row(GAP),
-    (RELEASING, S.LIMIT): Row(SPENT, A.HELD),
-    (GAP, S.QUIET): Row(GAP),
-    (GAP, S.WEAK): Row(GAP),
-    (GAP, S.STRONG): Row(CONTACT, None, _again),
-    (GAP, S.GAP_OVER): Row(IDLE, A.CLOSE),
-    (GAP, S.LIMIT): Row(SPENT, A.HELD),
-    (SPENT, S.QUIET): Row(SPENT, None, _quiet),
-    (SPENT, S.WEAK): Row(SPENT, None, _lie),
-    (SPENT, S.STRONG): Row(SPENT, None, _lie),
-    (SPENT, S.RELEASED): Row(IDLE, A.LEFT),
+    (IDLE, S.QUIET): (IDLE, None, None),
+    (IDLE, S.WEAK): (IDLE, None, None),
+    (IDLE, S.STRONG): (CONTACT, A.OPEN, _begin),
+    (CONTACT, S.QUIET): (RELEASING, None, _quiet),
+    (CONTACT, S.WEAK): (CONTACT, None, _graze),
+    (CONTACT, S.STRONG): (CONTACT, None, _press),
+    (CONTACT, S.ROSE): (CONTACT, A.RISE, None),
+    (CONTACT, S.MOVED): (CONTACT, A.SPLIT, _part),
+    (CONTACT, S.LIMIT): (SPENT, A.HELD, None),
+    (RELEASING, S.QUIET): (RELEASING, None, None),
+    (RELEASING, S.WEAK): (RELEASING, None, None),
+    (RELEASING, S.STRONG): (CONTACT, None, _press),
+    (RELEASING, S.RELEASED): (IDLE, A.CLOSE, None),
+    (RELEASING, S.TAPPED): (GAP, None, None),
+    (RELEASING, S.LIMIT): (SPENT, A.HELD, None),
+    (GAP, S.QUIET): (GAP, None, None),
+    (GAP, S.WEAK): (GAP, None, None),
+    (GAP, S.STRONG): (CONTACT, None, _again),
+    (GAP, S.GAP_OVER): (IDLE, A.CLOSE, None),
+    (GAP, S.LIMIT): (SPENT, A.HELD, None),
+    (SPENT, S.QUIET): (SPENT, None, _quiet),
+    (SPENT, S.WEAK): (SPENT, None, _lie),
+    (SPENT, S.STRONG): (SPENT, None, _lie),
+    (SPENT, S.RELEASED): (IDLE, A.LEFT, None),
 }
 
 
@@ -245,61 +240,74 @@ class Segmenter:
         """For a sensor of so many `taxels`; `travel`: taxel pitches that a tap may move."""
         self.on = hardly_ever(taxels)  # noise units: activity from which there is a contact
         self.off = rarely(taxels)  # noise units: activity below which there is none
-        self._memory = Memory(timing or Timing(), self.on, self.off, travel, wait_for_double_tap)
-        self.after = self._memory.after  # what the last contact has left behind
-        self.phase: Phase = IDLE
+        self.timing, self.travel, self.waits = timing or Timing(), travel, wait_for_double_tap
+        self.after = AfterEffect(self.on)  # what the last contact has left behind
+        self.reset()
 
     def reset(self) -> None:
         """Start clean, in IDLE."""
-        self.phase = IDLE
-        self._memory.clear()
+        self.phase: Phase = IDLE
+        self.after.clear()
+        self.first: Stretch | None = None  # the segment's first contact, if `contact` is its second
+        self.quiet_since: float | None = None  # s, the first quiet frame since the last touched one
+        self.rise(0.0)
+
+    def rise(self, t: float, under: float = 0.0) -> None:
+        """A contact begins at `t` s, above something that lies there with an activity of `under` noise units."""
+        self.contact = Stretch(t)  # the contact that goes on, or the last one
+        self.rests = Stretch(t)  # since when a contact that was given up has stayed in its place
+        self.under = under
+        self._span = t  # s, when the latest of the spans began
+        self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
+
+    def lately(self, t: float, activity: float) -> float:
+        """Take a frame at `t` s; return the highest activity of the two spans before the present one, else 0."""
+        older, old, latest = self._tops
+        if t - self._span >= SPAN_S:
+            older, old, latest, self._span = old, latest, 0.0, t
+        self._tops = (older, old, max(latest, activity))
+        return max(older, old) if older else 0.0
+
+    def tap_so_far(self) -> bool:
+        """Whether the contact is short and stayed where it was."""
+        contact = self.contact
+        return contact.touched - contact.began <= self.timing.tap_s and contact.widest <= self.travel
 
     @property
     def onset(self) -> float:
         """When the segment began, in s."""
-        return self._memory.onset
-
-    @property
-    def second(self) -> bool:
-        """Whether the segment's second contact has begun."""
-        return self._memory.first is not None
-
-    @property
-    def rests_since(self) -> float:
-        """When a contact that was given up moved last, in s; its onset where it has stayed in its place since then."""
-        return self._memory.rests.began
+        return self.contact.began if self.first is None else self.first.began
 
     @property
     def last_touched(self) -> float:
         """When the last contact was touched last, in s."""
-        return self._memory.contact.touched
+        return self.contact.touched
 
     def levels(self, t: float) -> tuple[float, float]:
         """Activity from which a frame at `t` s is strong, and below which it is quiet; noise units."""
-        return self.phase.levels(self._memory, t)
+        return self.phase.levels(self, t)
 
     def push(self, t: float, activity: float, place: Centroid | None) -> list[Deed]:
         """One frame at `t` s, after `wait(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
         if activity < self.off and self.phase is IDLE:
             return []  # what the first row of the table says, without looking it up
-        return self._step(self.phase.reads(self._memory, t, activity), t, activity, place)
+        return self._step(self.phase.reads(self, t, activity), t, activity, place)
 
     @property
     def over(self) -> float | None:
         """When the wait that goes on is over unless the finger comes back, in s; None where none goes on."""
-        wait, since = self.phase.wait, self._memory.quiet_since
-        return since + float(getattr(self._memory.timing, wait)) if wait and since is not None else None
+        wait, since = self.phase.wait, self.quiet_since
+        return since + float(getattr(self.timing, wait)) if wait and since is not None else None
 
     def wait(self, t: float, sure: float) -> list[Deed]:
         """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over.
 
         A wait that was over while everything was known, until `sure` (s), is decided at its end; another one at `t`.
         """
-        memory = self._memory
         deeds: list[Deed] = []
         while (says := self.phase.says) is not None and (over := self.over) is not None and t >= over:
-            deeds += self._step(says(memory), over if over <= sure else t)
-        if self.phase.pending and t - memory.onset >= memory.timing.limit_s:
+            deeds += self._step(says(self), over if over <= sure else t)
+        if self.phase.pending and t - self.onset >= self.timing.limit_s:
             deeds += self.give_up(t)
         return deeds
 
@@ -313,17 +321,12 @@ class Segmenter:
         deeds: list[Deed] = []
         while signal is not None:
             then, action, remember = TRANSITIONS[self.phase, signal]
-            if action is not None:
-                deeds.append(self._deed(action, t))
+            if action is Action.OPEN:
+                deeds.append(Deed(action, t, t, t))
+            elif action is Action.SPLIT and self.first is not None:
+                deeds.append(Deed(action, self.first.began, self.first.touched, t))
+            elif action is not None:  # about the segment as it is before this frame is remembered
+                deeds.append(Deed(action, self.onset, self.last_touched, t))
             self.phase = then
-            signal = None if remember is None else remember(self._memory, t, activity, place)
+            signal = None if remember is None else remember(self, t, activity, place)
         return deeds
-
-    def _deed(self, action: Action, t: float) -> Deed:
-        """The deed of an action, with the segment as it is before the frame at `t` s is remembered."""
-        memory = self._memory
-        if action is Action.OPEN:
-            return Deed(action, t, t, t)
-        if action is Action.SPLIT and memory.first is not None:
-            return Deed(action, memory.first.began, memory.first.touched, t)
-        return Deed(action, memory.onset, memory.contact.touched, t)

@@ -6,22 +6,25 @@ frames arrive. Whoever has no arrivals (`gestured.open`, the lab) uses `push`, `
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
-from gestured.core.beside.reading import Reading, View, Vitals, view_of
+from gestured.core.beside.reading import Reading, Vitals, view_of
 from gestured.core.beside.touch import Fingers
 from gestured.core.classifier import Classifier, Scores
-from gestured.core.decision import Decision, reason, whole
+from gestured.core.cutter import bearable_s
+from gestured.core.decision import Decision
 from gestured.core.errors import ModelError
 from gestured.core.events import ANSWERS, Cancelled, Event, Gate, Gesture, Onset, Release, Unknown, Where
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened
 from gestured.core.listening import INHIBITED, Listening
 from gestured.core.owner import Owner, Source
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
+from gestured.core.timing import outside
 from gestured.core.where import where
 from gestured.core.wire import Arrival
 
@@ -59,9 +62,8 @@ class Sensor:
         self._scene, self._decision = scene, Decision(scene, name)
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self.stamper = Stamper(scene.clock_of(name))
-        self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
-        self._placed: tuple[Segment, Where] | None = None  # the segment that was located last, and where it was
-        self.shown: Shown | None = None  # what `ask` is to ask about
+        self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = None  # who, last; of what; the answers
+        self.shown: Segment | None = None  # what `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
         # Whether looks for provisional events wait until `look`; and where nobody asks for these, the model's runs for
@@ -89,8 +91,8 @@ class Sensor:
             told += self._tell(found)
         if foresight.asked and front_end.segmenter.phase.pending:
             last = found[-1] if found else None
-            if isinstance(last, Shown):
-                told += self._foresee(foresight.preview(front_end, last.segment, frame.t, drafted=True))
+            if isinstance(last, Segment):
+                told += self._foresee(foresight.preview(front_end, last, frame.t, drafted=True))
             foresight.see(front_end, frame.t)
             told += self._at_once()
         if self._fingers.asked and self.front_end.touched and not self._listening.silences(front_end.segmenter.onset):
@@ -110,10 +112,6 @@ class Sensor:
     def wait(self, t: float) -> list[Told]:
         """No frame has come until `t` s: a contact may be over; see `FrontEnd.wait`."""
         return self._late(t) + self._tell(self.front_end.wait(t))
-
-    def give_up(self, t: float) -> list[Told]:
-        """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
-        return self._tell(self.front_end.give_up(t))
 
     def flush(self, t: float) -> list[Told]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
@@ -146,7 +144,7 @@ class Sensor:
         """The events of what the front end has found, with the sensor's name and ids."""
         told: list[Told] = []
         for one in found:
-            if isinstance(one, Shown):
+            if isinstance(one, Segment):
                 self.shown = one
                 if self._foresight.asked or not self._later:
                     self.ask()
@@ -167,40 +165,30 @@ class Sensor:
     def ask(self) -> list[Told]:
         """Find out all that an answer to what was shown will say. Nothing is told of that before the answer is due."""
         if self.shown is not None:
-            self._ask(self.shown.segment)
-            self._at(self.shown.segment)
+            self._ask(self.shown)
         self.shown = None
         return []
 
-    def _ask(self, segment: Segment) -> Scores | None:
-        """The classifier's scores of a segment, which is asked about once; None where it fails."""
-        classifier, asked = self.classifier, self._asked
-        if asked is None or asked[0] is not classifier or asked[1] is not segment:
+    def _ask(self, segment: Segment) -> tuple[Scores | None, Where]:
+        """The classifier's scores of a segment, None where it fails, and where it was. It is asked about once."""
+        asked = self._asked
+        if asked is None or asked[0] is not self.classifier or asked[1] is not segment:
             try:
-                asked = classifier, segment, classifier.classify(segment)
+                scores = self.classifier.classify(segment)
             except ModelError:
-                asked = classifier, segment, None
-            self._asked = asked
-        return asked[2]
-
-    def _at(self, segment: Segment) -> Where:
-        """Where a segment was, which is looked at once."""
-        placed = self._placed
-        if placed is None or placed[0] is not segment:
-            placed = self._placed = segment, where(segment, self._zones)
-        return placed[1]
+                scores = None
+            asked = self._asked = self.classifier, segment, scores, where(segment, self._zones)
+        return asked[2:]
 
     def _decide(self, cut: Cut) -> list[Told]:
         """The answer to a segment, and `Decided` where a classifier gave scores."""
         name, segment, decision, listening = self.name, cut.segment, self._decision, self._listening
-        answer = self._ask(segment)
+        answer, at = self._ask(segment)
         self._asked = self.shown = None
         if answer is None:
             return [self._cancelled("model")]
-        at = self._at(segment)
-        self._placed = None
         scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
-        seen = whole(cut.hole_s, self.front_end.interval_s)
+        seen = cut.hole_s <= bearable_s(self.front_end.pace.interval_s)
         least = decision.threshold(best, answer, armed=segment.onset <= listening.armed_until)
         known = seen and decision.may(best, at.zone) and confidence >= least
         decided = Decided(name, segment, answer, known)
@@ -214,7 +202,8 @@ class Sensor:
         recognised = best if known or own is not None else None
         why = listening.refusal(segment.onset, recognised)
         if why is None and recognised is None:
-            why = reason(self.front_end.rate_hz, whole=seen)
+            # A sensor that is too slow or too fast explains it first.
+            why = "rate" if outside(self.front_end.rate_hz) else "confidence" if seen else "hole"
         if why is not None:
             gates = listening.silenced if why == INHIBITED else ()
             unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=at, gates=gates)
@@ -250,10 +239,10 @@ class Sensor:
             return []
         if not self._listening.hears(preview.segment.onset):
             return []
-        seen = whole(preview.hole_s, self.front_end.interval_s)
+        seen = preview.hole_s <= bearable_s(self.front_end.pace.interval_s)
         if not seen or not foresight.wants(preview, certainty, self._scene.gestures):
             return []
-        answer = self._ask(preview.segment) if preview.drafted else classifier.preview(preview.segment)
+        answer = self._ask(preview.segment)[0] if preview.drafted else classifier.preview(preview.segment)
         if answer is None:
             return []
         zone = where(preview.segment, self._zones).zone if decision.restricted else None
@@ -267,16 +256,11 @@ class Sensor:
 
     # --- by the hub's time: what is found is added to `facts`
 
-    @property
-    def numbers(self) -> tuple[int, int]:
-        """The last sequence and the last id that were used."""
-        return self.sequence, self.segments
-
     def count(self) -> tuple[int, int]:
         """The next sequence and id, for an event that is made up; they count as used."""
         self.sequence += 1
         self.segments += 1
-        return self.numbers
+        return self.sequence, self.segments
 
     @property
     def calm(self) -> bool:
@@ -326,7 +310,7 @@ class Sensor:
             if told:
                 self._add(told, now, facts)
         if self._open is not None and now - self._since > HELD_S:
-            self._run(self.give_up, now, facts)
+            self._run(lambda t: self._tell(self.front_end.give_up(t)), now, facts)
         if lost:
             self._lost, self._lost_at = self._lost + lost, now
         facts.append(_new(Arrived, ((self.name,), taken, lost, duplicates, late, implausible)))
@@ -369,7 +353,6 @@ class Sensor:
         if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
             facts.append(self._gate(self.stamper.at(now)))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
-        self._placed = None
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
         self._fingers.zones = self._zones
@@ -438,7 +421,7 @@ class Sensor:
             state,
             self._scene.grid_of(self.name),
             reason=reason,
-            interval_s=front_end.interval_s,
+            interval_s=front_end.pace.interval_s,
             jitter_s=self.vitals.jitter_s,
             bad_taxels=front_end.bad_taxels,
             noise=front_end.noise,
@@ -456,9 +439,10 @@ class Sensor:
             baseline=front_end.baseline if front_end.ready else None,
         )
 
-    def view(self, *, raw: bool) -> View | None:
-        """The sensor as it is felt now; None before its first frame."""
-        return view_of(self.front_end, raw=raw)
+    def view(self, now: float, *, raw: bool) -> dict[str, Any] | None:
+        """The sensor as it is felt at `now`, as JSON values; None before its first frame."""
+        felt = view_of(self.front_end, raw=raw)
+        return felt and {"sensor": self.name, "state": self.condition(now)[0], **felt, "contact": self._open}
 
     def _run(self, act: Callable[[float], list[Told]], now: float, facts: list[Fact]) -> None:
         self.run(lambda _: act(self.stamper.at(now)), now, facts)

@@ -62,13 +62,13 @@ class Settling:
 
     def __init__(self) -> None:
         self._frames: deque[tuple[float, Array]] = deque()
-        self._since: float | None = None  # s, the first frame since the sensor was last touched
+        self.since: float | None = None  # s, the first frame since the sensor was last touched
 
     def clear(self) -> None:
         """Forget what was collected: the sensor was touched."""
-        if self._since is not None:
+        if self.since is not None:
             self._frames.clear()
-            self._since = None
+            self.since = None
 
     def push(self, t: float, raw: Array, *, patience: bool) -> Learned | None:
         """Take one frame of (N,) counts; returns what was learned or nothing yet.
@@ -76,14 +76,14 @@ class Settling:
         `patience` allows an answer that is not stable after `PATIENCE_S`.
         """
         frames = self._frames
-        if self._since is None:
-            self._since = t
+        if self.since is None:
+            self.since = t
         if not frames or t - frames[-1][0] >= SETTLE_S / SETTLE_FRAMES:
             frames.append((t, raw))
         if t - frames[0][0] < SETTLE_S or len(frames) < LEAST_FRAMES:
             return None
         learned = _learned(np.array([counts for _, counts in frames]))
-        if not learned.stable and not (patience and t - self._since >= PATIENCE_S):
+        if not learned.stable and not (patience and t - self.since >= PATIENCE_S):
             while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
                 frames.popleft()
             return None

@@ -53,13 +53,6 @@ class Peak(NamedTuple):
     table: Array  # (n, W * SIDE * SIDE) their weights
 
 
-class Pair(NamedTuple):
-    """The peaks of two fingers."""
-
-    between: Taxels  # along the line between them
-    nearer: NDArray[np.bool_]  # (R * C,) whether a taxel is less far from the first than from the second
-
-
 def spots(frame: Array, shape: tuple[int, int], noise: float) -> list[Spot]:
     """The fingers in a frame of R x C taxels, the strongest first: one, or two that can be told apart.
 
@@ -70,7 +63,7 @@ def spots(frame: Array, shape: tuple[int, int], noise: float) -> list[Spot]:
     strong = frame > level / 2
     if second is None:
         return [_new(Spot, (*_place(frame, first), level, int(np.count_nonzero(strong))))]
-    nearer, other = _pair(shape, first.taxel, second.taxel).nearer, frame.item(second.taxel)
+    (_, nearer), other = _pair(shape, first.taxel, second.taxel), frame.item(second.taxel)
     one = Spot(*_place(frame, first), level, int(np.count_nonzero(strong & nearer)))
     return [one, Spot(*_place(frame, second), other, int(np.count_nonzero((frame > other / 2) & ~nearer)))]
 
@@ -91,7 +84,7 @@ def _peaks(frame: Array, shape: tuple[int, int], noise: float) -> tuple[Peak, Pe
     if level < SECOND * frame.item(first.taxel) or level < NOISE * noise:
         return first, None
     second = _peak(shape, first.others.item(at), REACH)
-    between = _pair(shape, first.taxel, second.taxel).between
+    between, _ = _pair(shape, first.taxel, second.taxel)
     if level < frame[second.beside].max() or frame[between].min() > VALLEY * level:
         return first, None  # it is no peak, or no valley lies between it and the first
     if max(abs(second.row - first.row), abs(second.column - first.column)) > APART:
@@ -140,15 +133,15 @@ def _peak(shape: tuple[int, int], taxel: int, reach: int) -> Peak:
 
 
 @lru_cache(PEAKS)
-def _pair(shape: tuple[int, int], first: int, second: int) -> Pair:
-    """Two taxels as peaks."""
+def _pair(shape: tuple[int, int], first: int, second: int) -> tuple[Taxels, NDArray[np.bool_]]:
+    """Of two peaks: the taxels along the line between them, and (R * C,) whether one is nearer to the first."""
     (row, column), (down, across), columns = divmod(first, shape[1]), divmod(second, shape[1]), shape[1]
     steps = 2 * max(abs(down - row), abs(across - column))
     shares = [k * (1.0 / steps) for k in range(1, steps)]
     between = [round(row + s * (down - row)) * columns + round(column + s * (across - column)) for s in shares]
     rows, across_to = np.indices(shape)
     nearer = (rows - row) ** 2 + (across_to - column) ** 2 < (rows - down) ** 2 + (across_to - across) ** 2
-    return Pair(np.array(between, np.int64), nearer.ravel())
+    return np.array(between, np.int64), nearer.ravel()
 
 
 @lru_cache(TABLES)

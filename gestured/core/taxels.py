@@ -1,13 +1,14 @@
 """Which taxels are bad: those that are stuck, that froze under a finger, or are noisy; and what they would show."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# Of a contact: (N,) taxels that did not change, and those of them whose neighbours were pressed.
+Still = tuple[Mask, Mask]
 
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
 FROZEN_S = 0.4  # a pressed taxel that stays the same to the last digit for so long is no finger
@@ -25,40 +26,6 @@ RUBBISH_ONE_IN = 2  # taxels; where more than one in so many jumps for RUBBISH_S
 RUBBISH_S = 1.0  # how long a contact must last before its frames are rubbish: a burst passes
 STEADY_FRAMES = 30  # frames without a turn, after which a taxel flickers no more
 NEAR, DIAGONAL = 2.0, 1.0  # weights of a taxel's eight neighbours
-
-
-class Inspection(NamedTuple):
-    """What the frames of one contact say of its taxels."""
-
-    still: Mask  # (N,) taxels that did not change
-    suspect: Mask  # (N,) taxels that did not change although their neighbours were pressed
-    any_suspect: bool
-
-
-class Stuck:
-    """The taxels that show the same whatever presses them."""
-
-    def __init__(self, taxels: int) -> None:
-        self.mask: Mask = np.zeros(taxels, dtype=bool)
-        self._strikes = np.zeros(taxels, dtype=np.int64)
-        self._blameless = False  # whether no taxel has strikes or is stuck
-
-    def learn(self, constant: Mask) -> None:
-        """Take the (N,) taxels that never changed while the idle sensor's others did."""
-        self.mask = constant
-        self._blameless = False
-
-    def judge(self, seen: Inspection) -> bool:
-        """A contact is over: a taxel that stood still under pressure twice is stuck. True if the stuck ones changed."""
-        if self._blameless and not seen.any_suspect:
-            return False
-        self._strikes[seen.suspect] += 1
-        self._strikes[~seen.still] = 0
-        stuck = (self.mask & seen.still) | (self._strikes >= STRIKES)
-        self._blameless = not (stuck.any() or self._strikes.any())
-        changed = bool((stuck != self.mask).any())
-        self.mask = stuck
-        return changed
 
 
 class Frozen:
@@ -161,28 +128,48 @@ class Taxels:
 
     def __init__(self, rows: int, columns: int) -> None:
         self.rows, self.columns = rows, columns
-        self.stuck = Stuck(rows * columns)
+        self._stuck: Mask = np.zeros(rows * columns, dtype=bool)  # those that show the same whatever presses them
+        self._strikes = np.zeros(rows * columns, dtype=np.int64)
+        self._blameless = False  # whether no taxel has strikes or is stuck
         self.frozen = Frozen(rows * columns)
         self.flickering = Flickering(rows, columns)
         self.bad: Mask = np.zeros(rows * columns, dtype=bool)  # replaced, never changed in place
         self.count = 0  # how many taxels are bad
 
+    def learn(self, constant: Mask, *, fine: bool) -> None:
+        """The sensor was learned anew. `constant`: (N,) taxels that never changed; `fine`: as `Frozen.learn` has it."""
+        self._stuck, self._blameless = constant, False
+        self.frozen.learn(fine=fine)
+        self.flickering.learn()
+
     def review(self, sigma: Array, noise: float) -> None:
         """Say which are bad, by each taxel's noise (N,) and the sensor's. Where all are, none counts as bad."""
-        self.bad = self.stuck.mask | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
+        self.bad = self._stuck | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
         self.count = int(np.count_nonzero(self.bad))
 
-    def inspect(self, frames: Array, noise: float) -> Inspection:
+    def inspect(self, frames: Array, noise: float) -> Still:
         """Look at the frames of a contact, (T, N) counts above the baseline, not yet bridged."""
         if len(frames) < 2:
-            return Inspection(np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool), False)
+            return np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool)
         peaks = frames.max(axis=0)
         around = neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
         still = np.ptp(frames, axis=0) == 0
-        suspect = still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
-        return Inspection(still, suspect, bool(suspect.any()))
+        return still, still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
+
+    def judge(self, seen: Still) -> bool:
+        """A contact is over: a taxel that stood still under pressure twice is stuck. True if the stuck ones changed."""
+        still, suspect = seen
+        if self._blameless and not suspect.any():
+            return False
+        self._strikes[suspect] += 1
+        self._strikes[~still] = 0
+        stuck = (self._stuck & still) | (self._strikes >= STRIKES)
+        self._blameless = not (stuck.any() or self._strikes.any())
+        changed = bool((stuck != self._stuck).any())
+        self._stuck = stuck
+        return changed
 
     def bridge(self, frames: Array) -> Array:
         """(T, N) -> (T, R, C) with the bad taxels replaced by what their good neighbours show."""

@@ -7,6 +7,7 @@ the sensor), `not_finite`, `too_many_touches`.
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count
 from typing import Any, Literal, NamedTuple
 
@@ -115,13 +116,10 @@ class _Route(NamedTuple):
     fault: tuple[str, str] | None  # reason and text of the ProtocolError, where the address or its type tags are wrong
 
 
-class _Meaning(NamedTuple):
-    """Of packets of one layout that hold one frame, and beside it nothing that is wanted."""
-
-    route: _Route
-    slot: Slot  # of the frame's message
-    dtype: np.dtype[Any]  # of the frame's values as they are sent
-    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
+# Of packets of one layout that hold one frame, and beside it nothing that is wanted: the frame's route, the place of
+# its message, the type of its values as they are sent, and a number that is the same for packets whose frames stand in
+# the same place, of the same type and grid.
+_Meaning = tuple[_Route, Slot, np.dtype[Any], int]
 
 
 class Decoder:
@@ -137,7 +135,7 @@ class Decoder:
         self._grids = grids
         self._keep_touches = keep_touches
         self._layouts = Layouts()
-        self._routes: dict[tuple[str, str], _Route] = {}  # a memo, bounded
+        self._route = lru_cache(_MAX_ROUTES)(self._find_route)
         self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, which is compared faster
         self._numbers = count()
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
@@ -153,9 +151,8 @@ class Decoder:
         found: list[tuple[int, str, Arrival | tuple[Touch, ...]]] = []  # the bundle's number, the sensor
         touched = bool(self._pending)
         for message in osc.decode(packet, errors, self._layouts):
-            key = message.address, message.types
             try:
-                route = self._routes.get(key) or self._learn(*key)
+                route = self._route(message.address, message.types)
                 if route.fault is not None:
                     raise ProtocolError(*route.fault)
                 if route.grid is not None:
@@ -182,7 +179,7 @@ class Decoder:
                 if meaning is None:
                     meaning = layout.meaning = self._meaning(layout)
                 if meaning:
-                    alike.setdefault(meaning.form, []).append((i, meaning))
+                    alike.setdefault(meaning[-1], []).append((i, meaning))
         found: dict[tuple[object, ...], list[Block]] = {}
         for members in alike.values():
             if len(members) >= FEW:
@@ -193,10 +190,9 @@ class Decoder:
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """What packets of a layout hold; False where each of them has to be read by itself."""
-        routes = [self._routes.get((slot.address, slot.types)) for slot in layout.slots]
-        frames = [(r, p) for r, p in zip(routes, layout.slots, strict=True) if r is not None and r.grid is not None]
-        known = all(route is not None and route.fault is None for route in routes)
-        if self._keep_touches or not known or len(frames) != 1:
+        routes = [self._route(slot.address, slot.types) for slot in layout.slots]
+        frames = [(r, p) for r, p in zip(routes, layout.slots, strict=True) if r.grid is not None]
+        if self._keep_touches or any(route.fault for route in routes) or len(frames) != 1:
             return False
         route, slot = frames[0]
         rows, columns = route.grid or (0, 0)
@@ -207,15 +203,9 @@ class Decoder:
         form = layout.length, bundled, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        return _Meaning(route, slot, dtype, self._forms.setdefault(form, next(self._numbers)))
+        return route, slot, dtype, self._forms.setdefault(form, next(self._numbers))
 
-    def _learn(self, address: str, types: str) -> _Route:
-        if len(self._routes) >= _MAX_ROUTES:
-            self._routes.clear()
-        route = self._routes[address, types] = self._route(address, types)
-        return route
-
-    def _route(self, address: str, types: str) -> _Route:
+    def _find_route(self, address: str, types: str) -> _Route:
         matched = self._addresses.match(address)
         if matched is None:
             return _Route("", None, False, ("address", f"{address!r} is no sensor's address"))
@@ -313,7 +303,7 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
     if slot.start:  # alone, a message begins at 0
         tags = osc.timetags(block[:, 8:16])
     found = Block(
-        [i for i, _ in members], [meaning.route.sensor for _, meaning in members],
+        [i for i, _ in members], [route.sensor for _, (route, *_) in members],
         values.reshape(-1, *route.grid), counters, tags,
     )  # fmt: skip
     return found if good.all() else found.only(good.nonzero()[0])

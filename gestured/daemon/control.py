@@ -17,6 +17,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from gestured.core.errors import GesturedError
+from gestured.core.messages import json_line
 from gestured.daemon.log import Throttle
 from gestured.daemon.request import (
     MAX_REQUEST_BYTES,
@@ -24,9 +25,7 @@ from gestured.daemon.request import (
     Peer,
     Refusal,
     Reply,
-    ReplyStream,
     Verb,
-    json_line,
     parse_request,
     peer_of,
 )
@@ -127,29 +126,29 @@ class ControlServer:
         async with self._turn(self._slow if verb.slow else self._quick):
             if connection.closed or self._ended:  # the operator left while this waited for its turn
                 return
-            found = await self._run(connection, verb, parameters)
-            # The answer goes out before the lines that the verb streams.
-            _write(writer, json_line(found.answer if isinstance(found, ReplyStream) else found))
-        if isinstance(found, ReplyStream):
+            answer, lines = await self._run(connection, verb, parameters)
+            _write(writer, json_line(answer))  # before the lines that the verb streams
+        if lines is not None:
             self._streaming = True
             try:
-                await self._stream(connection, writer, found.lines)
+                await self._stream(connection, writer, lines)
             finally:
                 self._streaming = False
 
-    async def _run(self, connection: Connection, verb: Verb, parameters: Mapping[str, Any]) -> Reply | ReplyStream:
+    async def _run(
+        self, connection: Connection, verb: Verb, parameters: Mapping[str, Any]
+    ) -> tuple[Reply, Iterator[bytes] | None]:
         try:
             found = await verb.run(connection, **parameters)
-            if not isinstance(found, ReplyStream):
-                return {"ok": True, **found}
-            if self._streaming:
+            answer, lines = found if isinstance(found, tuple) else (found, None)
+            if lines is not None and self._streaming:
                 raise Refusal("it is being sent to somebody else; ask again when that is over")
-            return ReplyStream({"ok": True, **found.answer}, found.lines)
+            return {"ok": True, **answer}, lines
         except GesturedError as error:
-            return _refused(str(error))
+            return _refused(str(error)), None
         except Exception:  # a bug in a verb costs this answer alone
             self._throttle.error("a bug in a verb", "control")
-            return _refused("a bug; the daemon's log has the traceback")
+            return _refused("a bug; the daemon's log has the traceback"), None
 
     async def _stream(self, connection: Connection, writer: asyncio.StreamWriter, lines: Iterator[bytes]) -> None:
         while not connection.closed:

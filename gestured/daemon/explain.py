@@ -8,8 +8,7 @@ from gestured.client.address import control_beside, default_socket
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.daemon.asked import open_ladder, outputs_of, scene_of
-from gestured.daemon.client import BACKLOG_BYTES
-from gestured.daemon.clients import CLIENTS
+from gestured.daemon.clients import BACKLOG_BYTES, CLIENTS
 from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
@@ -159,7 +158,7 @@ def _strictness(settings: Settings, ladder: Ladder) -> Said:
             one = f"{model.threshold:.2f} for all, whatever the strictness"
             yield THRESHOLDS, f"{rung.name} has no operating points: {one}"
             continue
-        for name, point in model.points.points.items():
+        for name, point in model.points.items():
             cost = f"{100 * point.missed:.1f} % missed, {point.false_per_hour:.2g} false an hour"
             yield THRESHOLDS, f"{rung.name} {name}: {cost}, in {point.hours:g} hours that were judged"
         if arms:

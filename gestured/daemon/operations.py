@@ -141,7 +141,7 @@ class Operations:
         if not self._parts.taps.ring_bytes:
             raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
         held = self._parts.taps.flight()
-        return ReplyStream(scene(self._parts) | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
+        return scene(self._parts) | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',))
 
     def _heard(self, sensor: str | None = None) -> dict[str, Reading]:
         """The sensors that were heard, by name. Raises Refusal where the one that is asked for is none of them."""

@@ -9,10 +9,11 @@ from typing import Any
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
 from gestured.core.facts import Decided, Fact
+from gestured.core.messages import json_line
 from gestured.core.own import EXAMPLES, MOST, Examples, is_name
 from gestured.daemon.keeper import Keeper
 from gestured.daemon.log import log
-from gestured.daemon.request import Connection, Refusal, json_line
+from gestured.daemon.request import Connection, Refusal
 from gestured.model.enrolment import Enrolment, Examiner
 from gestured.model.ladder import Ladder
 from gestured.model.model import Model

@@ -5,7 +5,6 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from gestured.core import messages
 from gestured.core.beside.reading import Reading
 from gestured.core.hub import Hub
 from gestured.daemon.asked import Asked
@@ -82,7 +81,9 @@ class Parts:
     def listening(self) -> dict[str, dict[str, Any]]:
         """What gates and arming say of the sensors of which they say anything."""
         now = time.monotonic()
-        return messages.listening(self.hub.listening(now), time.time() - now)
+        epoch, gates = time.time() - now, self.hub.listening(now)
+        until = {gate.sensor: None if gate.until is None else gate.until + epoch for gate in gates}
+        return {g.sensor: {"armed": g.armed, "closed": g.closed, "until": until[g.sensor]} for g in gates}
 
     def awaiting_restart(self) -> list[str]:
         """Settings that a reload has read, but that a restart alone can put to use."""

@@ -1,7 +1,6 @@
 """Requests of the control socket: who asks, what each verb takes, and how it is answered. Both are JSON lines."""
 
 import asyncio
-import json
 import os
 import socket
 import struct
@@ -23,12 +22,8 @@ BACKLOG_BYTES = 8 << 20  # bytes that wait for a connection with a stream at mos
 SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 Reply = dict[str, Any]
-_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
-
-
-def json_line(reply: Reply) -> bytes:
-    """A reply, or what is streamed after one, as a line of the control socket. Raises ValueError for NaN, infinity."""
-    return _ENCODER.encode(reply).encode() + b"\n"
+# An answer, and the lines that follow it, which are made as they are read.
+ReplyStream = tuple[Reply, Iterator[bytes]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +83,6 @@ class Connection:
         """Send nothing more after what waits for this connection already."""
         self.flush()
         self._over = True
-
-
-@dataclass(frozen=True, slots=True)
-class ReplyStream:
-    """An answer and the lines that follow it, which are made as they are read."""
-
-    answer: Reply
-    lines: Iterator[bytes]
 
 
 class Refusal(GesturedError):

@@ -56,7 +56,7 @@ class Service:
         own = OwnGestures(self._own_changed)
         own.follow(ladder, *own.read(asked.own, ladder))
         hub = Hub(scene_of(settings, ladder), ladder, later=True)
-        taps, views = Taps(settings.flight_recorder << 20), Views(hub, self._state, self._foresee)
+        taps, views = Taps(settings.flight_recorder << 20), Views(hub, lambda: status(self.parts), self._foresee)
         clients = EventServer(bound.events.sock, self._hello, metrics, known=self._known, changed=self._foresee)
         desk = Desk(metrics, Shift.of(ladder.model), own, views, ())
         receiver = Receiver(bound.udp, bound.since, hub, desk, taps)
@@ -74,10 +74,6 @@ class Service:
             from gestured.daemon.http import serve_pages
 
             self._http = serve_pages(bound.http, self.parts)
-
-    def _state(self) -> dict[str, Any]:
-        """Everything that an operator may see of the daemon now."""
-        return status(self.parts)
 
     def _sinks(self) -> tuple[Sink, ...]:
         """The sinks of events: those who act on them before those who look on."""
@@ -114,7 +110,7 @@ class Service:
 
     def _wanted(self, kind: str) -> frozenset[str] | None:
         """The sensors of which somebody wants events of that type, None for all."""
-        named, every = self.parts.clients.asked(kind)
+        named, every = self.parts.clients.audience.asked(kind)
         every = every or any(kind in output.wants for output in self.parts.asked.outputs)
         return None if every else named | self.parts.views.sensors
 

@@ -15,8 +15,9 @@ from itertools import islice
 
 from gestured.core import messages
 from gestured.core.events import Event, Status, Touch
+from gestured.core.messages import json_line
 from gestured.core.owner import Source
-from gestured.daemon.request import Connection, json_line
+from gestured.daemon.request import Connection
 
 KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
@@ -36,7 +37,7 @@ class Taps:
         self._waiting: deque[Remembered] = deque()  # packets and events that are to be streamed soon
         self._timer: asyncio.Handle | None = None
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
-        self._size = 0
+        self.held_bytes = 0  # in the ring
         self._gates: dict[str, bytes] = {}  # by sensor: the line that said what it listened to where the ring begins
 
     @property
@@ -80,11 +81,6 @@ class Taps:
         self._forget(time.monotonic_ns())
         return deque((*self._gates.values(), *(what for _, _, what in self._ring)))
 
-    @property
-    def held_bytes(self) -> int:
-        """Bytes that the flight recorder holds."""
-        return self._size
-
     def tick(self) -> None:
         """Tell slow readers what they lost, forget those that went; call it once a second."""
         self._live = [connection for connection in self._live if not connection.closed]
@@ -101,7 +97,7 @@ class Taps:
                 self._timer = asyncio.get_running_loop().call_later(SOON_S, self._turn)
         if self.ring_bytes:
             self._ring.append((t_ns, size + OVERHEAD_BYTES, what))
-            self._size += size + OVERHEAD_BYTES
+            self.held_bytes += size + OVERHEAD_BYTES
             self._forget(t_ns)
 
     def _turn(self) -> None:
@@ -118,20 +114,23 @@ class Taps:
 
     def _forget(self, now_ns: int) -> None:
         oldest = now_ns - round(KEPT_S * 1e9)
-        while self._ring and (self._size > self.ring_bytes or self._ring[0][0] < oldest):
+        while self._ring and (self.held_bytes > self.ring_bytes or self._ring[0][0] < oldest):
             _, size, what = self._ring.popleft()
-            self._size -= size
+            self.held_bytes -= size
             if isinstance(what, bytes) and what.startswith(GATE):
                 self._gates[json.loads(what)["sensor"]] = what
 
 
-def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
-    """A packet as a line of the control socket: its time in ns (monotonic), who sent it, its bytes as base64."""
-    return json_line({"type": "packet", "t_ns": t_ns, "source": source[:2], "data": base64.b64encode(packet).decode()})
-
-
 def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:
-    """Packets and events as lines of the control socket. Each is taken out of `remembered`: what was sent is let go."""
+    """Packets and events as lines of the control socket. Each is taken out of `remembered`: what was sent is let go.
+
+    A packet's line has its time in ns (monotonic), who sent it, and its bytes as base64.
+    """
     while remembered:
         what = remembered.popleft()
-        yield what if isinstance(what, bytes) else packet_line(*what)
+        if isinstance(what, bytes):
+            yield what
+        else:
+            t_ns, source, packet = what
+            data = base64.b64encode(packet).decode()
+            yield json_line({"type": "packet", "t_ns": t_ns, "source": source[:2], "data": data})

@@ -4,14 +4,24 @@ import ipaddress
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator
 
-from gestured.core.address import Address, Destination, Grid, is_sensor
+from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
+
+
+class Destination(NamedTuple):
+    """Where events are sent, and how. As a text SCHEME://HOST:PORT."""
+
+    scheme: str
+    address: Address
+
+    def __str__(self) -> str:
+        return f"{self.scheme}://{self.address}"
 
 
 def expected(problem: Mapping[str, Any]) -> str:

@@ -8,34 +8,16 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gestured.core.beside.reading import Reading, View
 from gestured.core.events import Event, Provisional, Status, Touch
 from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
-from gestured.core.messages import to_json
-from gestured.daemon.request import Connection, Reply, json_line
+from gestured.core.messages import json_line, to_json
+from gestured.daemon.request import Connection, Reply
 from gestured.daemon.tap import SOON_S
 
 VIEW_S = 1 / 30  # between two views of one sensor, since nobody sees more than 30 a second
 UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, it misses views until it has read them
-
-
-@dataclass(frozen=True, slots=True)
-class Viewer:
-    """What one connection looks at."""
-
-    sensors: frozenset[str]
-    raw: bool  # counts as they were sent, too
-
-    def hears(self, event: Event) -> bool:
-        """Whether the connection is told of an event; of guesses and fingers only those of the sensors it looks at."""
-        return not isinstance(event, Provisional | Touch) or event.sensor in self.sensors
 
 
 class Views:
@@ -44,7 +26,8 @@ class Views:
     def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
         """`state` gives the daemon's state; `changed` is called when other sensors are looked at than before."""
         self._hub, self._state, self._changed = hub, state, changed
-        self._looks: dict[Connection, Viewer] = {}
+        # By connection: the sensors that it looks at, and whether at their counts as they were sent, too.
+        self._looks: dict[Connection, tuple[frozenset[str], bool]] = {}
         self._due: set[str] = set()  # sensors that are looked at and have sent frames since
         self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
         self._state_due = False
@@ -54,12 +37,12 @@ class Views:
     @property
     def sensors(self) -> frozenset[str]:
         """The sensors that somebody looks at."""
-        return frozenset().union(*(look.sensors for look in self._looks.values()))
+        return frozenset().union(*(sensors for sensors, _ in self._looks.values()))
 
     def follow(self, connection: Connection, sensors: Collection[str], *, raw: bool) -> None:
         """Stream to a connection: the state and the views of sensors as they are now, and then what is new."""
         connection.streams, connection.flush = True, self._tell_events
-        self._looks[connection] = Viewer(frozenset(sensors), raw)
+        self._looks[connection] = (frozenset(sensors), raw)
         self._forget_gone()
         self._changed()
         self._state_due = True
@@ -69,11 +52,11 @@ class Views:
         """Take note of which sensors sent something."""
         if self._looks:
             arrived = {name for fact in facts if isinstance(fact, Arrived) for name in fact.sensors}
-            self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
+            self._expect(self.sensors & arrived)
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Take an event, as a sink, for all who look on. The status is left out, since the state says more."""
-        if not isinstance(event, Status) and any(look.hears(event) for look in self._looks.values()):
+        if not isinstance(event, Status) and any(_hears(sensors, event) for sensors, _ in self._looks.values()):
             self._said.append((event, epoch, test))
             self._expect(())
 
@@ -118,18 +101,18 @@ class Views:
         """Tell each connection what happened, in one write."""
         said, self._said = self._said, []
         lines = [(event, to_json(event, epoch, test=test)) for event, epoch, test in said]
-        for connection, look in self._looks.items():
-            heard = [line for event, line in lines if look.hears(event)]
+        for connection, (sensors, _) in self._looks.items():
+            heard = [line for event, line in lines if _hears(sensors, event)]
             if heard:
                 connection.send(b"".join(heard), lines=len(heard))
 
     def _show(self, sensor: str) -> None:
         self._due.discard(sensor)
         for raw in (False, True):
-            lookers = [one for one, look in self._looks.items() if sensor in look.sensors and look.raw is raw]
+            lookers = [one for one, (sensors, sent) in self._looks.items() if sensor in sensors and sent is raw]
             view = self._hub.view(sensor, time.monotonic(), raw=raw) if lookers else None
             if view is not None:
-                self._send(json_line({"type": "view"} | viewed(sensor, *view)), lookers)
+                self._send(json_line({"type": "view", **view, "time": time.time()}), lookers)
 
     def _send(self, line: bytes, connections: Collection[Connection]) -> None:
         """Send a view or a state; a connection that has not read the last ones misses it."""
@@ -139,33 +122,11 @@ class Views:
 
     def _forget_gone(self) -> None:
         before = self.sensors
-        self._looks = {one: look for one, look in self._looks.items() if not one.closed}
+        self._looks = {one: what for one, what in self._looks.items() if not one.closed}
         if self.sensors != before:
             self._changed()
 
 
-def viewed(sensor: str, view: View, reading: Reading) -> dict[str, Any]:
-    """One sensor at a moment, grids row by row; `values` are counts above the baseline, activity is in noise units."""
-    return {
-        "sensor": sensor,
-        "state": reading.state,
-        "t": view.t,
-        "grid": list(view.values.shape if view.values is not None else reading.grid),
-        "values": None if view.values is None else _rounded(view.values),
-        "bad": [] if view.bad is None else np.flatnonzero(view.bad).tolist(),
-        "raw_grid": list(reading.grid),
-        "raw": None if view.raw is None else _rounded(view.raw),
-        "noise": round(view.noise, 3),
-        "activity": round(view.activity, 2),
-        "on": round(view.on, 2),
-        "off": round(view.off, 2),
-        "phase": view.phase,
-        "centroid": None if view.centroid is None else [round(place, 3) for place in view.centroid],
-        "contact": reading.contact,
-        "time": time.time(),
-    }
-
-
-def _rounded(grid: NDArray[Any]) -> list[float]:
-    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
-    return numbers
+def _hears(sensors: frozenset[str], event: Event) -> bool:
+    """Whether who looks at these sensors is told of an event: of guesses and fingers, only those of the sensors."""
+    return not isinstance(event, Provisional | Touch) or event.sensor in sensors

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from gestured.core.points import Certainty, OperatingPoints
+from gestured.core.points import Certainty, Curve, Point
 from gestured.core.window import Window
 from gestured.model.context import NAMES as CONTEXT
 from gestured.model.features import feature_names
@@ -49,7 +49,8 @@ class Metadata:
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
     provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
-    points: OperatingPoints | None  # thresholds by strictness, and what they cost
+    points: Mapping[str, Point] | None  # by strictness: thresholds, and what they cost
+    curve: Curve  # what a threshold of all gestures alike would cost; empty without `points`
     own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
 
     @classmethod
@@ -85,6 +86,10 @@ class Metadata:
         gestures = told("gestures", partial(_names, 2, 64))
         calibration = told("calibration", _object)
         threshold = calibration.get("threshold", USUAL_THRESHOLD)
+        points, curve = perhaps("operating_points", lambda text: operating_points(_object(text), gestures)) or (
+            None,
+            (),
+        )
         return cls(
             gestures=gestures,
             kind=properties["kind"],
@@ -98,7 +103,8 @@ class Metadata:
             quantiles=told("quantiles", _object),
             self_test=told("self_test", lambda text: SelfTest.from_json(_object(text))),
             provisional=perhaps("provisional", lambda text: certainty(_object(text), gestures)),
-            points=perhaps("operating_points", lambda text: operating_points(_object(text), gestures)),
+            points=points,
+            curve=curve,
             own=perhaps("own", lambda text: Space.from_json(_object(text), len(gestures))),
         )
 

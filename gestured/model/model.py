@@ -130,7 +130,7 @@ class Model:
             "window": asdict(known.window),
             "calibration": dict(known.calibration),
             "provisional": known.provisional is not None,
-            "operating_points": None if known.points is None else asdict(known.points)["points"],
+            "operating_points": known.points and {name: asdict(point) for name, point in known.points.items()},
             "training_data": known.training_data,
             "self_test": {"largest_difference": self.self_test_error, "tolerance": TOLERANCE},
         }

@@ -6,7 +6,7 @@ What is wrong with one is a ValueError that names the key and what was expected.
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from gestured.core.points import STRICTNESS, Certainty, Needed, OperatingPoints, Point
+from gestured.core.points import STRICTNESS, Certainty, Curve, Needed, Point
 
 MOST = 1e6  # hours, and false gestures an hour: no measurement has more, and it keeps numbers within a float's range
 MOST_ROWS = 1000  # of the curve
@@ -15,13 +15,13 @@ MOST_S = 3600.0  # longer than any contact
 COSTS = {"missed": 1.0, "false_per_hour": MOST, "hours": MOST}  # of a point, each with the most that it may be
 
 
-def operating_points(found: Mapping[str, Any], gestures: Collection[str]) -> OperatingPoints:
-    """The points that `found` holds for a model of these gestures."""
+def operating_points(found: Mapping[str, Any], gestures: Collection[str]) -> tuple[Mapping[str, Point], Curve]:
+    """By strictness the points, and the curve that they lie on, that `found` holds for a model of these gestures."""
     _require_keys("", found, (*STRICTNESS, "curve"))
-    return OperatingPoints(
-        {strictness: _point(strictness, found[strictness], gestures) for strictness in STRICTNESS},
-        _curve(found["curve"]),
-    )
+    points: dict[str, Point] = {
+        strictness: _point(strictness, found[strictness], gestures) for strictness in STRICTNESS
+    }
+    return points, _curve(found["curve"])
 
 
 def certainty(found: Mapping[str, Any], gestures: Collection[str]) -> Certainty:

@@ -111,7 +111,7 @@ def test_what_is_proposed_keeps_the_budget_and_nothing_that_costs_less_does(
     model = models[with_points]
     least_possible = min(
         counted(played, one).unmeant
-        for one in (0.99, *(point.thresholds for point in (model.points.points.values() if model.points else ())))
+        for one in (0.99, *(point.thresholds for point in (model.points.values() if model.points else ())))
     )
     if budget is not None and least_possible > most:
         with pytest.raises(

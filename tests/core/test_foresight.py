@@ -16,7 +16,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, 
 from gestured.core.facts import Fault, events_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
-from gestured.core.points import Certainty, OperatingPoints, Point
+from gestured.core.points import Certainty, Point
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
@@ -180,7 +180,7 @@ def test_what_the_configuration_asks_for_holds_where_it_is_more() -> None:
 )
 def test_an_operating_point_may_ask_for_more_than_the_rule(floor: float | None, least: float, said: bool) -> None:
     point = Point(dict.fromkeys(GESTURES, least), floor, 0.0, 0.0, 1.0)
-    points = OperatingPoints({"strict": point, "normal": replace(point, provisional=1.0)}, ())
+    points = {"strict": point, "normal": replace(point, provisional=1.0)}
     told = replace(says("left", 0.45), points=points)
     seer = Seer(lambda segment: told, lambda segment: told, Certainty(1, (0.0,), (0.3,)))
     found = names(run(recognizer(seer, strictness="strict"), frames(IDLE, SWIPE, PAUSE)))

@@ -16,7 +16,7 @@ from gestured.core.facts import Changed, Decided
 from gestured.core.hub import Hub
 from gestured.core.listening import Arming
 from gestured.core.messages import to_json
-from gestured.core.points import Certainty, OperatingPoints, Point
+from gestured.core.points import Certainty, Point
 from gestured.core.scene import Scene, Setup
 from gestured.record.replay import Replay, opened
 from tests.core.test_foresight import Seer
@@ -152,7 +152,7 @@ NAMES = ("one_tap", "double_tap", "left", "right")
 
 def asking(answer: Scores, least: float) -> Scores:
     """An answer of a model whose usual operating point asks for so much of each gesture."""
-    return replace(answer, points=OperatingPoints({"normal": Point(dict.fromkeys(NAMES, least), None, 0, 0, 1)}, ()))
+    return replace(answer, points={"normal": Point(dict.fromkeys(NAMES, least), None, 0, 0, 1)})
 
 
 @given(LEAST, LEAST, st.dictionaries(st.sampled_from(["double_tap", "left"]), LEAST))

@@ -24,7 +24,7 @@ holes = st.tuples(st.integers(2, 8), st.integers(3, 5), st.integers(2, 8))
 def seen(path: Path, hole: Hole) -> tuple[list[Sight], list[Sight]]:
     """What is seen of a finger on both sides of a hole."""
     before, missing, after = hole
-    sights = [Sight(n * STEP_S, path(n * STEP_S)) for n in range(before + missing + after)]
+    sights = [(n * STEP_S, path(n * STEP_S)) for n in range(before + missing + after)]
     return sights[:before], sights[before + missing :]
 
 
@@ -63,11 +63,9 @@ def test_a_finger_that_turned_behind_the_hole_may_have_done_so_in_it(
     heading: float, speed: float, hole: Hole, turn: float
 ) -> None:
     came, went = seen(straight(heading, speed), hole)
-    corner, goes = went[0], straight(heading + turn, speed)
-    ways = [goes(one.t - corner.t) for one in went]
-    went = [
-        Sight(one.t, (corner.place[0] + way[0], corner.place[1] + way[1])) for one, way in zip(went, ways, strict=True)
-    ]
+    (begun, (row, column)), goes = went[0], straight(heading + turn, speed)
+    ways = [(t, goes(t - begun)) for t, _ in went]
+    went = [(t, (row + down, column + across)) for t, (down, across) in ways]
     assert not clear(came, went, TRAVEL)
 
 
@@ -96,5 +94,5 @@ def test_a_finger_that_got_less_far_than_it_was_fast_is_not_clear(
 ) -> None:
     came, went = seen(straight(heading, speed), hole)
     less = straight(heading, (1 - share) * speed)((hole[1] + 1) * STEP_S)
-    went = [Sight(one.t, (one.place[0] - less[0], one.place[1] - less[1])) for one in went]
+    went = [(t, (row - less[0], column - less[1])) for t, (row, column) in went]
     assert not clear(came, went, TRAVEL)

@@ -20,8 +20,8 @@ from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Decided, events_of
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown, Void
-from gestured.core.points import STRICTNESS, OperatingPoints, Point
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
+from gestured.core.points import STRICTNESS, Point
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
@@ -132,8 +132,8 @@ def test_a_draft_comes_before_its_cut_and_is_the_same_segment(lines: tuple[str, 
     cuts = 0
     for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms"):
         for found in front_end.push(frame):
-            if isinstance(found, Shown):
-                drafts.append(found.segment)
+            if isinstance(found, Segment):
+                drafts.append(found)
             elif isinstance(found, Cut):
                 cuts += 1
                 assert any(draft is found.segment for draft in drafts)
@@ -345,9 +345,7 @@ def test_a_threshold_is_the_scenes_else_the_operating_points_else_the_calibratio
     by_strictness: list[float], one: str | None, usual: str, calibrated: float | None, own: dict[str, float]
 ) -> None:
     at = dict(zip(STRICTNESS, by_strictness, strict=True))
-    points = OperatingPoints(
-        {name: Point(dict.fromkeys(GESTURES, 0.0) | {"left": least}, None, 0, 0, 1) for name, least in at.items()}, ()
-    )
+    points = {name: Point(dict.fromkeys(GESTURES, 0.0) | {"left": least}, None, 0, 0, 1) for name, least in at.items()}
     answer = says(0.1, 0.5, 0.4, threshold=0.0 if calibrated is None else calibrated)
     sensors = {"armrest": Setup(strictness=one), "other": Setup(strictness="eager")}
     subject = recognizer(
@@ -440,9 +438,7 @@ def test_the_classifier_may_be_replaced_between_frames() -> None:
 
 def test_another_strictness_holds_from_the_next_answer_on() -> None:
     at = {"eager": 0.2, "strict": 0.95}
-    points = OperatingPoints(
-        {name: Point(dict.fromkeys(GESTURES, least), None, 0, 0, 1) for name, least in at.items()}, ()
-    )
+    points = {name: Point(dict.fromkeys(GESTURES, least), None, 0, 0, 1) for name, least in at.items()}
     subject = recognizer(classifier := Fake([replace(SURE, points=points)]), strictness="eager")
     stream = swipes(1)
     middle = next(n for n, frame in enumerate(stream) if frame.t > 1.7)

@@ -238,7 +238,7 @@ def test_invented_addresses_cost_no_memory() -> None:
     for n in range(2000):
         decode.decode(trajectory((1, 1.0, 1.0), sensor=f"s{n}"), source=n)
         decode.decode(encoding.message(f"/x{n}", ""))
-    assert len(decode._routes) <= wire._MAX_ROUTES and len(decode._pending) <= wire._MAX_PENDING
+    assert decode._route.cache_info().currsize <= wire._MAX_ROUTES and len(decode._pending) <= wire._MAX_PENDING
 
 
 # --- touches

@@ -43,7 +43,7 @@ class Desk:
         return {}
 
     async def stream(self, connection: Connection) -> ReplyStream:
-        return ReplyStream({}, self.lines())
+        return {}, self.lines()
 
     def lines(self) -> Iterator[bytes]:
         for _ in range(LINES):

@@ -17,7 +17,7 @@ from gestured.core.beside.reading import Reading
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Ended, Found, FrontEnd, Opened, Shown, Void
+from gestured.core.front_end import Ended, Found, FrontEnd, Opened, Void
 from gestured.core.hub import Hub
 from gestured.core.sensor import Sensor
 from gestured.core.stamping import Stamp, Stamper
@@ -153,7 +153,7 @@ def front_ends(tape: Tape) -> Iterator[tuple[str, FrontEnd, Stamp, list[tuple[in
                     each += front_end.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
                     for one in each:
                         numbers[name] += isinstance(one, Opened)
-                        if not isinstance(one, Shown):
+                        if not isinstance(one, Segment):
                             found.append((numbers[name], one))
                 yield name, front_end, stamp, found
 

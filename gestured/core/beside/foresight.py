@@ -69,7 +69,7 @@ class Foresight:
         if front_end.fleeting:
             return
         self._passed_over += 1
-        interval_s = front_end.interval_s
+        interval_s = front_end.pace.interval_s
         if self._passed_over * interval_s < PREVIEW_S and interval_s < EACH_FRAME_S:
             return
         self._passed_over = 0
@@ -96,8 +96,10 @@ class Foresight:
 
     def preview(self, front_end: FrontEnd, segment: Segment, t: float, *, drafted: bool) -> Preview:
         """That segment of the contact that goes on, at `t` s."""
-        hole_s = front_end.hole(segment, t)
-        return Preview(segment, t, not front_end.segmenter.phase.let_go, drafted, front_end.segmenter.second, hole_s)
+        hole_s = front_end.cutter.hole(segment.onset, segment.offset, t)
+        return Preview(
+            segment, t, not front_end.segmenter.phase.let_go, drafted, front_end.segmenter.first is not None, hole_s
+        )
 
     def wants(self, preview: Preview, certainty: Certainty, gestures: Iterable[str]) -> bool:
         """Whether anything can be said now, of these gestures, if the model is sure enough; else it need not look."""

@@ -1,6 +1,7 @@
 """What is known of a sensor: at a moment, for status, metrics and whoever looks at it; and its jitter over time."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,6 @@ from gestured.core.events import Gate
 from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.quantiles import median
-
-Array = NDArray[np.float64]
 
 # From good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
@@ -97,7 +96,7 @@ class Vitals:
 
     def review(self, front_end: FrontEnd) -> None:
         """Keep the first baseline, the least noise and the interval. Beside the way of a frame, with each tick."""
-        self.interval_s = front_end.interval_s
+        self.interval_s = front_end.pace.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
         if front_end.conditioner.idle.lively:  # the noise of other sensors is a guess
@@ -134,36 +133,37 @@ class Vitals:
         return "ok", ""
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """The last frame, and what the segmenter goes by. Grids are as mounted, but for `raw`."""
+def view_of(front_end: FrontEnd, *, raw: bool) -> dict[str, Any] | None:
+    """The last frame and what the segmenter goes by, as JSON values; None before the first frame.
 
-    t: float  # s, on the stream's clock
-    phase: str
-    on: float  # noise units: the activity from which there is a contact now
-    off: float  # noise units: the activity below which there is none
-    noise: float  # counts
-    values: Array | None = None  # (R, C) counts above the baseline, bad taxels bridged; None before it is learned
-    bad: NDArray[np.bool_] | None = None  # (R, C)
-    activity: float = 0.0  # noise units
-    centroid: tuple[float, float] | None = None  # row and column; None where it is not touched
-    raw: NDArray[np.generic] | None = None  # (R, C) counts as they were sent; on request
-
-
-def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
-    """A sensor's view now; None before its first frame."""
+    Grids are row by row, as mounted but for `raw`; `values` are counts above the baseline with bad taxels bridged, None
+    before it is learned; activity is in noise units, and the centroid a row and a column, None where nobody touches.
+    """
     shown, look, t = front_end.last_sent, front_end.look, front_end.pace.last
     if shown is None or t is None:
         return None
-    phase, (on, off) = front_end.levels(t)
-    found = View(t, phase, on, off, front_end.noise, raw=shown if raw else None)
-    if look is None:
-        return found
-    taxels = front_end.conditioner.taxels
-    return replace(
-        found,
-        values=taxels.bridge(look.above[None])[0],
-        bad=taxels.bad.reshape(taxels.rows, taxels.columns),
-        activity=look.activity,
-        centroid=front_end.conditioner.place(look) if look.activity >= off else None,
-    )
+    conditioner, segmenter = front_end.conditioner, front_end.segmenter
+    values = bad = centroid = None
+    on, off = segmenter.levels(t)
+    if look is not None:
+        values, bad = conditioner.taxels.bridge(look.above[None])[0], conditioner.taxels.bad
+        centroid = conditioner.place(look) if look.activity >= off else None
+    return {
+        "t": t,
+        "grid": list(front_end.grid_sent if values is None else values.shape),
+        "values": None if values is None else _rounded(values),
+        "bad": [] if bad is None else np.flatnonzero(bad).tolist(),
+        "raw_grid": list(front_end.grid_sent),
+        "raw": _rounded(shown) if raw else None,
+        "noise": round(front_end.noise, 3),
+        "activity": 0.0 if look is None else round(look.activity, 2),
+        "on": round(on, 2),
+        "off": round(off, 2),
+        "phase": segmenter.phase.name,
+        "centroid": None if centroid is None else [round(place, 3) for place in centroid],
+    }
+
+
+def _rounded(grid: NDArray[Any]) -> list[float]:
+    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
+    return numbers

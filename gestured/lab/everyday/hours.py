@@ -210,7 +210,7 @@ def points_of(model: Model) -> dict[str, Least]:
     """The operating points of a model: thresholds by strictness; its one threshold where it has none."""
     if model.points is None:
         return {USUAL: model.threshold}
-    return {name: dict(point.thresholds) for name, point in model.points.points.items()}
+    return {name: dict(point.thresholds) for name, point in model.points.items()}
 
 
 def cost(heard: Sequence[Heard], model: str, least: Least) -> dict[str, float | None]:
