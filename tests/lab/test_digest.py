@@ -2,7 +2,9 @@
 
 import importlib.util
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,11 +14,25 @@ from gestured.lab import made_of
 from gestured.lab.digest import code_digest
 
 
-@pytest.fixture
-def copy(tmp_path: Path) -> Path:
-    """A copy of the package that can be changed."""
-    shutil.copytree(Path(gestured.__file__).parent, tmp_path / "gestured", ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path / "gestured"
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package that can be changed, and is left as it was."""
+    package = tmp_path_factory.mktemp("copy") / "gestured"
+    shutil.copytree(Path(gestured.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    return package
+
+
+@contextmanager
+def changed(*paths: Path, by: Callable[[str], str]) -> Iterator[None]:
+    """Files that hold something else for a while."""
+    before = {path: path.read_text() for path in paths}
+    try:
+        for path, text in before.items():
+            path.write_text(by(text))
+        yield
+    finally:
+        for path, text in before.items():
+            path.write_text(text)
 
 
 def digest_of(package: Path) -> Callable[[str, frozenset[str]], str]:
@@ -33,12 +49,15 @@ def digest(package: Path, module: str) -> str:
     return digest_of(package)(module, frozenset())
 
 
+begun = cache(digest)  # of the copy as it was made
+
+
 def test_comments_docstrings_and_line_breaks_are_no_code(copy: Path) -> None:
-    before = digest(copy, "gestured.lab.dataset")
-    assert before == code_digest("gestured.lab.dataset")
-    for path in copy.rglob("*.py"):
-        path.write_text("# Said about it.\n\n" + path.read_text().replace('"""', '"""Said about it. ', 1))
-    assert digest(copy, "gestured.lab.dataset") == before
+    assert begun(copy, "gestured.lab.dataset") == code_digest("gestured.lab.dataset")
+    with changed(
+        *copy.rglob("*.py"), by=lambda text: "# Said about it.\n\n" + text.replace('"""', '"""Said about it. ', 1)
+    ):
+        assert digest(copy, "gestured.lab.dataset") == begun(copy, "gestured.lab.dataset")
 
 
 @pytest.mark.parametrize(
@@ -52,17 +71,16 @@ def test_comments_docstrings_and_line_breaks_are_no_code(copy: Path) -> None:
     ],
 )
 def test_every_change_of_code_that_is_used_changes_it(copy: Path, module: str, room: str) -> None:
-    before = digest(copy, module)
-    with (copy / room).open("a") as file:
-        file.write("\nOTHER_CODE = 1\n")
-    assert digest(copy, module) != before
+    before = begun(copy, module)
+    with changed(copy / room, by=lambda text: f"{text}\nOTHER_CODE = 1\n"):
+        assert digest(copy, module) != before
 
 
-@pytest.mark.parametrize("room", ["control/cli.py", "core/osc.py", "core/sensor.py", "client/subscriber.py"])
-def test_code_that_is_not_used_does_not_count(copy: Path, room: str) -> None:
-    before = digest(copy, "gestured.lab.dataset")
-    (copy / room).write_text("")
-    assert digest(copy, "gestured.lab.dataset") == before
+def test_code_that_is_not_used_does_not_count(copy: Path) -> None:
+    before = begun(copy, "gestured.lab.dataset")
+    rooms = ("control/cli.py", "core/osc.py", "core/sensor.py", "client/subscriber.py")
+    with changed(*(copy / room for room in rooms), by=lambda text: ""):
+        assert digest(copy, "gestured.lab.dataset") == before
 
 
 def test_a_table_names_the_code_that_decides_it_and_no_more(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,12 +88,10 @@ def test_a_table_names_the_code_that_decides_it_and_no_more(copy: Path, monkeypa
         monkeypatch.setattr(made_of, "code_digest", digest_of(copy))
         return [made_of.decides.__wrapped__(code) for code in (made_of.DECIDES, ("gestured.core.where",))]
 
-    begun = told()
-    for room, changed in (
+    before = told()
+    for room, other in (
         ("daemon/service.py", []), ("core/osc.py", []), ("lab/everyday/hours.py", []), ("core/spots.py", [1]),
         ("core/decision.py", [0]), ("model/context.py", [0]), ("core/contact.py", [0, 1]),
     ):  # fmt: skip
-        before = (copy / room).read_text()
-        (copy / room).write_text(f"{before}\nOTHER_CODE = 1\n")
-        assert [n for n, (one, other) in enumerate(zip(begun, told(), strict=True)) if one != other] == changed, room
-        (copy / room).write_text(before)
+        with changed(copy / room, by=lambda text: f"{text}\nOTHER_CODE = 1\n"):
+            assert [n for n, (one, now) in enumerate(zip(before, told(), strict=True)) if one != now] == other, room
