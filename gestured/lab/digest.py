@@ -19,17 +19,24 @@ def code_digest(module: str, aside: frozenset[str] = frozenset()) -> str:
     A module is used that an import or a text names, anywhere in the code: programs are started by their name. Those
     that are set `aside` do not count, nor what they alone use.
     """
-    found: dict[Path, ast.Module] = {}
+    found: dict[Path, str] = {}
     todo = list(_files(module))
     while todo:
         path = todo.pop()
         if path not in found:
-            found[path] = tree = _WithoutTexts().visit(ast.parse(path.read_bytes()))
-            todo += [other for name in _named(tree) if name not in aside for other in _files(name)]
+            found[path], names = _code(path)
+            todo += [other for name in names if name not in aside for other in _files(name)]
     total = hashlib.sha256()
     for path in sorted(found):
-        total.update(f"{path.relative_to(PACKAGE)}\n{ast.dump(found[path])}\n".encode())
+        total.update(f"{path.relative_to(PACKAGE)}\n{found[path]}\n".encode())
     return total.hexdigest()
+
+
+@cache
+def _code(path: Path) -> tuple[str, frozenset[str]]:
+    """What a file's code does, and every name in it that may be a module's."""
+    tree = _WithoutTexts().visit(ast.parse(path.read_bytes()))
+    return ast.dump(tree), frozenset(_named(tree))
 
 
 def file_digest(path: Path) -> str:

@@ -24,6 +24,8 @@ LEFT = ("tp_rf", "lstm", "cnn_lstm")  # those that ship
 def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in set(METHODS) - set(LEFT):
         monkeypatch.delitem(METHODS, name)
+    small_forest = ({"features": "paper", "trees": 10, "depth": 4},)
+    monkeypatch.setitem(METHODS, "tp_rf", replace(METHODS["tp_rf"], grid=small_forest))
     few = [t.index for t in TRIALS if t.participant < 3 and t.speed == "normal" and t.inclination == 1]
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
     small = Plan.small
