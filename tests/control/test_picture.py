@@ -33,15 +33,9 @@ def test_nothing_is_an_empty_picture():
     assert not trace(np.full((3, 9, 9), 7)).any()
 
 
-def test_without_colour_five_lines_of_nine_characters():
-    lines = draw(trace(swipe_right(9, 9)), colour=False)
-    assert [len(line) for line in lines] == [9] * 5
-    assert "\x1b" not in "".join(lines)
-    assert lines[2].strip() and not lines[0].strip()
-
-
-def test_with_colour_the_same_size_on_a_screen():
-    lines = draw(trace(swipe_right(9, 9)), colour=True)
-    seen = [re.sub("\x1b\\[[0-9;]*m", "", line) for line in lines]
-    assert [len(line) for line in seen] == [9] * 5
-    assert all(line.endswith("\x1b[0m") for line in lines)
+def test_five_lines_of_nine_characters_with_colour_and_without():
+    plain, coloured = (draw(trace(swipe_right(9, 9)), colour=colour) for colour in (False, True))
+    seen = [re.sub("\x1b\\[[0-9;]*m", "", line) for line in coloured]
+    assert [len(line) for line in plain] == [len(line) for line in seen] == [9] * 5
+    assert "\x1b" not in "".join(plain) and all(line.endswith("\x1b[0m") for line in coloured)
+    assert plain[2].strip() and not plain[0].strip()

@@ -44,17 +44,6 @@ def without(package: str, *lines: str, cwd: Path) -> "subprocess.CompletedProces
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=60)
 
 
-@pytest.mark.parametrize("command", sorted(COMMANDS))
-def test_help_shows_an_example_that_is_valid(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main([command, "--help"])
-    assert ended.value.code == 0
-    shown = " ".join(capsys.readouterr().out.split())
-    example = shown.split("example: gestured-lab ")[1].split()
-    assert example[0] == command
-    assert parser().parse_args(example).command == command
-
-
 @pytest.mark.parametrize(("command", "package"), [("evaluate", "torch"), ("train", "onnx")])
 def test_what_is_missing_is_said_in_one_sentence(command: str, package: str, tmp_path: Path) -> None:
     if package != "torch":
@@ -67,9 +56,13 @@ def test_what_is_missing_is_said_in_one_sentence(command: str, package: str, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_help_needs_no_torch(tmp_path: Path) -> None:
+def test_help_needs_no_torch_and_shows_an_example_that_is_valid(tmp_path: Path) -> None:
     done = without("torch", *(f"{command} --help" for command in COMMANDS), cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "") and done.stdout.count("usage: ") == len(COMMANDS)
+    assert (done.returncode, done.stderr) == (0, "")
+    _, *shown = " ".join(done.stdout.split()).split("usage: ")
+    for command, text in zip(COMMANDS, shown, strict=True):
+        example = text.split("example: gestured-lab ")[1].split()
+        assert example[0] == command == parser().parse_args(example).command
 
 
 @pytest.mark.parametrize("line", ["", "fly", "train --jobs many", "train --epochs 3", "everyday --hours long"])

@@ -18,11 +18,9 @@ from gestured.lab.fit import (
     balanced,
     build,
     finetune,
-    load_nets,
     logits,
     padded,
     pretrain,
-    save,
     targets,
 )
 from gestured.lab.progress import progress as shown
@@ -96,14 +94,6 @@ def test_training_changes_every_net_and_lowers_the_loss(whole: tuple[nn.ModuleDi
     assert losses[-1] < losses[0]
     for name, value in before.items():
         assert not np.array_equal(value, after[name]), name
-
-
-def test_weights_survive_the_file(samples: Samples, tmp_path: Path) -> None:
-    torch.manual_seed(3)
-    nets = build()
-    save(tmp_path / "new" / "nets.pt", nets.state_dict())
-    alike(nets, load_nets(tmp_path / "new" / "nets.pt"))
-    assert [p.name for p in (tmp_path / "new").iterdir()] == ["nets.pt"]
 
 
 def test_every_sample_is_learned_from_once_an_epoch(samples: Samples) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gestured.lab.stability.stiff import Case, cases, stiff_table
+from gestured.lab.stability.stiff import Case, cases, day_table, stiff_table
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
@@ -32,3 +32,10 @@ def test_harmless_cases_lose_no_more_than_a_gesture_or_two(monkeypatch: pytest.M
         assert asked == meant and isinstance(found, int) and found >= right - 2 and false == 0, title
     assert blind[3] == 0
     assert day[2] == 2 and day[3] in (1, 2) and day[6] == 0
+
+
+def test_the_same_hours_leave_the_same_behind() -> None:
+    """What a front end holds does not grow."""
+    (_, frames, after, most, digest), (_, *again) = day_table(quick=True).rows
+    assert [frames, after, most, digest] == again
+    assert isinstance(after, int) and isinstance(most, int) and 8 * 81 * 5 < after <= most < 50_000

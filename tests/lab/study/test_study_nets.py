@@ -28,20 +28,14 @@ def test_what_comes_later_changes_nothing(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_graph_answers_as_the_network_for_every_length(kind: str) -> None:
-    net = SequenceNet(kind, 16, 10, 4).eval()
-    graph = Graph.of_net(net)
-    for frames in (1, 3, 40):
-        x = torch.rand(1, frames, 9, 9)
-        with torch.no_grad():
-            expected = net(x, torch.tensor([frames - 1])).softmax(1).numpy()
-        assert np.allclose(graph.run(x.numpy()), expected, atol=1e-4)
-
-
-def test_the_graph_of_the_image_network() -> None:
-    net = HistoryNet(10, 4).eval()
-    x = torch.rand(1, 9, 9)
+    net, images = SequenceNet(kind, 16, 10, 4).eval(), HistoryNet(10, 4).eval()
+    graph, image = Graph.of_net(net), torch.rand(1, 9, 9)
     with torch.no_grad():
-        assert np.allclose(Graph.of_net(net).run(x.numpy()), net(x).numpy(), atol=1e-4)
+        for frames in (1, 3, 40):
+            x = torch.rand(1, frames, 9, 9)
+            expected = net(x, torch.tensor([frames - 1])).softmax(1).numpy()
+            assert np.allclose(graph.run(x.numpy()), expected, atol=1e-4)
+        assert np.allclose(Graph.of_net(images).run(image.numpy()), images(image).numpy(), atol=1e-4)
 
 
 def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None:
