@@ -35,12 +35,13 @@ demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECO
 bridges: .venv/.bridges  ## what gestured-bridge needs for MQTT, Zenoh and serial sensors, into .venv
 	@.venv/bin/gestured-bridge --help
 
+# One process more than there are cores, since tests wait for programs that they have started.
 test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
 ifdef ARGS
 	@.venv-dev/bin/python -m pytest $(ARGS)
 else
-	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile
+	@.venv-dev/bin/python -m pytest --numprocesses $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist loadfile
 endif
 
 golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)
