@@ -1,9 +1,10 @@
 """The command line of programs with subcommands: their help, and the sentence where one fails."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import Any, TextIO, TypeAlias
 
 import gestured
 from gestured.client.lines import JOIN, Forbidden
@@ -41,4 +42,20 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
         return 1
     except KeyboardInterrupt:
         return 0
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            _give_up(stream)
     return status
+
+
+def _give_up(stream: TextIO | None) -> None:
+    """What a stream still holds cannot be written: Python would try at its end, and have a status of its own.
+
+    A stream that was closed when we began is None.
+    """
+    if stream is None:
+        return
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

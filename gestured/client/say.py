@@ -6,7 +6,10 @@ programs print through this module alone.
 
 import json
 import sys
+from contextlib import suppress
 from typing import TextIO
+
+from gestured.core.errors import GesturedError
 
 MOST = 2000  # characters of a line at most: none of our own is longer, unless a path in it is
 
@@ -47,5 +50,18 @@ def tell(as_json: bool, value: object, *lines: object) -> None:
 
 
 def say_drawn(text: str, end: str = "\n", to: TextIO | None = None) -> None:
-    """Print text with line breaks, colours or a picture; foreign text in it must have gone through `shown`."""
-    print(text, end=end, file=to or sys.stdout, flush=True)
+    """Print text with line breaks, colours or a picture; foreign text in it must have gone through `shown`.
+
+    Standard error that takes no more, as a log on a full disk, stops nothing. Raises GesturedError where standard
+    output does not, but BrokenPipeError where its reader has gone.
+    """
+    if to is not None and to is sys.stderr:
+        with suppress(OSError):
+            print(text, end=end, file=to, flush=True)
+        return
+    try:
+        print(text, end=end, file=to or sys.stdout, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise GesturedError(f"standard output cannot be written: {error.strerror}") from None

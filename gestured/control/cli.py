@@ -1,7 +1,6 @@
 """The command line of gesturectl."""
 
 import io
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -49,9 +48,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # a terminal without block characters shows question marks
     try:
         given = sys.argv[1:] if argv is None else argv
-        status = program.run(parser(given), given)
-        sys.stdout.flush()
-        return status
+        return program.run(parser(given), given)
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

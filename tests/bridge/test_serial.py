@@ -6,6 +6,9 @@ import select
 import signal
 import socket
 import stat
+import subprocess
+import sys
+import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gestured.core.address import Address
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import Process, page, wait
 from tests.bridge.test_protocols import written
@@ -260,3 +264,24 @@ def test_metrics(bridge, line, udp):
     out.next()
     wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 2.0' in page(where))
     assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page(where)
+
+
+def test_a_log_on_a_full_disk_ends_no_bridge(line: Line, udp: socket.socket) -> None:
+    command = [sys.executable, "-m", "gestured.bridge", "serial", str(line.link), "--protocol", "csv", "--sensor", "s"]
+    with Path("/dev/full").open("wb") as full:
+        to = Address(*udp.getsockname())
+        process = subprocess.Popen(
+            [*command, "--grid", "9x9", "--to", str(to)], stdout=subprocess.PIPE, stderr=full, text=True
+        )
+    try:
+        assert process.stdout is not None and '"ready"' in process.stdout.readline()
+        line.say(b"\n" + (b"100 " * 81 + b"\n") * 2)
+        udp.settimeout(DEADLINE_S)
+        assert b"/s/pressure" in udp.recv(65_536)
+        line.unplug()  # which is said, too
+        line.plug()
+        time.sleep(0.1)
+        assert process.poll() is None
+    finally:
+        process.terminate()
+        assert process.wait(DEADLINE_S) == 0

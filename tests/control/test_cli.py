@@ -50,3 +50,23 @@ def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: 
     status, out, err = run(*command.split(), flag, value)
     assert (status, out) == (2, "")
     assert f"argument {flag}: " in err and value in err
+
+
+def redirected(where: str, *arguments: str) -> tuple[int, str]:
+    """Exit status and standard error of a gesturectl whose standard output a shell has led there."""
+    command = ["sh", "-c", f'exec "$@" {where}', "sh", sys.executable, "-m", "gestured.control", *arguments]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    return done.returncode, done.stderr
+
+
+def test_an_output_that_takes_nothing_is_one_sentence_and_no_traceback() -> None:
+    status, err = redirected(">/dev/full", "doctor", "--control", "/nowhere.ctl")
+    assert (status, err) == (1, "gesturectl: standard output cannot be written: No space left on device\n")
+
+
+def test_an_output_that_is_closed_costs_the_words_alone() -> None:
+    assert redirected(">&-", "doctor", "--control", "/nowhere.ctl") == (1, "")
+
+
+def test_an_error_that_cannot_be_said_changes_no_exit_status() -> None:
+    assert redirected("2>/dev/full", "status", "--control", "/nowhere.ctl") == (1, "")
