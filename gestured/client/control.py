@@ -2,9 +2,13 @@
 
 import json
 import socket
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from gestured import __version__
 from gestured.client.lines import Lines, Refused, Unreachable
 
 ANSWER_TIMEOUT_S = 20.0  # a reload opens and tests a model; everything else takes milliseconds
@@ -40,6 +44,15 @@ class Control(Lines):
         if answer["ok"] is not True:
             raise Refused(f"{verb}: {answer.get('reason')}")
         return answer
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """While what the daemon has said is read: Refused for what another version, or another program, says."""
+        try:
+            yield
+        except (KeyError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:
+            said = f"says something that gestured {__version__} does not say ({type(error).__name__}: {error})"
+            raise Refused(f"{self.path} {said}: are the daemon and this program of one version?") from error
 
     def finish(self) -> None:
         """End the requests: lines that are on their way still come, then `lines` ends. Any thread may call it."""

@@ -34,7 +34,9 @@ def event_path(args: argparse.Namespace) -> Path:
     if control is None:
         return find_socket(os.environ)
     with Control(Path(control)) as daemon:
-        return Path(daemon.ask("status")["addresses"]["socket"])
+        status = daemon.ask("status")
+        with daemon.reading():
+            return Path(status["addresses"]["socket"])
 
 
 def finish_on_signals(control: Control) -> None:

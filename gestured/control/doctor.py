@@ -69,7 +69,9 @@ def examine(path: Path) -> Iterator[Finding]:
     try:
         with Control(path) as control:
             status = control.ask("status")
-            proposed = _proposed(control) if dropping(status) else []
+            with control.reading():
+                proposed = _proposed(control) if dropping(status) else []
+                found = list(examine_status(status, proposed))
     except Forbidden as error:
         yield Finding("bad", str(error), JOIN)
         return
@@ -86,7 +88,7 @@ def examine(path: Path) -> Iterator[Finding]:
         yield model_finding("cnn_lstm", None)
         return
     yield _permissions(path)
-    yield from examine_status(status, proposed)
+    yield from found
 
 
 def _elsewhere(path: Path, others: list[Path]) -> Finding:

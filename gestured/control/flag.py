@@ -61,7 +61,8 @@ def flag(control: Control, path: Path, note: str) -> Keeper:
         raise Unreachable(f"the daemon closed the connection; {path} is not complete")
 
     with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape:
-        keeper = Keeper(tape, scene)
-        for line in lines():
-            keeper.keep(line)
+        with control.reading():
+            keeper = Keeper(tape, scene)
+            for line in lines():
+                keeper.keep(line)
     return keeper

@@ -97,7 +97,9 @@ def _asks(parser: Parser, verb: str, *parameters: str) -> None:
 def _ask(verb: str, parameters: tuple[str, ...], args: argparse.Namespace) -> int:
     with connect(args) as control:
         answer = control.ask(verb, **{name: getattr(args, name) for name in parameters})
-    tell(args.json, answer, *WORDS[verb](answer))
+        with control.reading():
+            words = list(WORDS[verb](answer))
+    tell(args.json, answer, *words)
     return 0
 
 

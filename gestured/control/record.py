@@ -52,8 +52,9 @@ def run(args: argparse.Namespace) -> int:
             say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)
             if args.seconds:
                 finish_after(control, args.seconds)
-            keeper = Keeper(tape, scene)
-            why = keeper.follow(control)
+            with control.reading():
+                keeper = Keeper(tape, scene)
+                why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
     if args.json:
         say_json(summary | {"ended": why})

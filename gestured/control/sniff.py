@@ -73,9 +73,10 @@ def overhear(control: Control, seconds: float, sight: Sight) -> Scene:
     """Have `sight` see for so long what reaches the daemon; what is set there. Raises GesturedError."""
     scene = maker(control.ask("tap")).scene
     finish_after(control, seconds)
-    for line in control.lines():
-        if line["type"] == "packet":
-            sight.packet(line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"]))
+    with control.reading():
+        for line in control.lines():
+            if line["type"] == "packet":
+                sight.packet(line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"]))
     if not control.finished:
         raise Unreachable("the daemon closed the connection")
     return scene

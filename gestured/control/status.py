@@ -50,14 +50,16 @@ def run(args: argparse.Namespace) -> int:
     with connect(args) as control:
         while True:
             status = control.ask("status")
+            with control.reading():
+                lines, ready = [] if args.json else list(screen(status)), status["ready"]["ready"]
             if args.json:
                 say_json(status)
             else:
                 if args.watch and sys.stdout.isatty():
                     say_drawn(CLEAR, end="")
-                say(*screen(status))
+                say(*lines)
             if not args.watch:
-                return 0 if status["ready"]["ready"] else 1
+                return 0 if ready else 1
             time.sleep(REFRESH_S)
 
 
@@ -74,15 +76,14 @@ def all_of_them(args: argparse.Namespace) -> int:
         try:
             with Control(path) as control:
                 status: dict[str, Any] = control.ask("status")
+                with control.reading():
+                    line, ready = "" if args.json else summary(path, status), status["ready"]["ready"]
         except GesturedError as error:
             bad += 1
             tell(args.json, {"control": str(path), "error": str(error)}, f"{path!s:<36} {error}")
             continue
-        bad += not status["ready"]["ready"]
-        if args.json:
-            say_json({"control": str(path), **status})
-        else:
-            say(summary(path, status))
+        bad += not ready
+        tell(args.json, {"control": str(path), **status}, line)
     return 1 if bad else 0
 
 

@@ -73,7 +73,9 @@ class Source:
         """Have the daemon recalibrate a sensor, or inhibit or allow it by GATE; what was done. Raises GesturedError."""
         gate = {} if verb == "recalibrate" else {"gate": GATE}
         with Control(self._control) as control:
-            return "; ".join(WORDS[verb](control.ask(verb, sensor=sensor, **gate)))
+            answer = control.ask(verb, sensor=sensor, **gate)
+            with control.reading():
+                return "; ".join(WORDS[verb](answer))
 
     def flag(self, note: str) -> str:
         """Keep what the flight recorder holds as a recording; what was done, in words. Raises GesturedError."""
