@@ -34,7 +34,8 @@ Mask = NDArray[np.bool_]
 FEW = 6  # frames from which on taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # frames of which times are kept, at least; a multiple of any depth
-KNOWN = 18  # numbers that are known of each sensor, as `Bank.enter` puts them
+KNOWN = 22  # numbers that are known of each sensor, as `Bank.enter` puts them
+INTERVAL, REVIEWED = 4, 18  # of those: the interval as it is, and as of the last tick
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # of each taxel: `Idle`, `Conditioner`; the last frame as it was sent
 
 
@@ -73,6 +74,11 @@ class Banks:
         """Put what readings tell, and when sensors were heard, into their objects; they stay where they are."""
         for bank in self._banks.values():
             bank.show()
+
+    def review(self) -> None:
+        """All sensors were reviewed; see `Vitals.review`."""
+        for bank in self._banks.values():
+            bank.review()
 
     def take(
         self, blocks: Sequence[Block], sources: Sequence[Source], others: set[str], now: float, facts: list[Fact]
@@ -136,6 +142,7 @@ class Bank:
             front.pace.interval_s, vitals.jitter_s,
             idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
             activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # activity and number of frames taken here
+            vitals.interval_s, *vitals.together,
         )  # fmt: skip
         assert front.last_sent is not None
         sent, weight = front.last_sent.reshape(-1), front.conditioner.weight
@@ -150,7 +157,7 @@ class Bank:
         del self._owners[name]
         self._free.append(row)
         (last, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
-         usual, scale, active, new, count) = self._known[row].tolist()  # fmt: skip
+         usual, scale, active, new, count, _, *together) = self._known[row].tolist()  # fmt: skip
         if not count:
             return
         front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
@@ -162,6 +169,7 @@ class Bank:
         if not math.isnan(counter):
             stamper.counter, stamper.late = int(counter), (0, 0)
         front.pace.interval_s, vitals.jitter_s = interval, jitter
+        vitals.together = together[0], together[1], int(together[2])
         idle.glance, idle.quieter, idle.reviewed, idle.level = glance, int(quieter), reviewed, level
         activity.usual, activity.scale = usual, scale
         idle.counts, idle.sigma, conditioner.weight, idle.compared, sent = self._taxels[row].copy()
@@ -192,6 +200,10 @@ class Bank:
             sensor.front_end.pace.interval_s, sensor.vitals.jitter_s = interval, jitter
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
 
+    def review(self) -> None:
+        """All sensors were reviewed: jitter is told by their intervals as they are now."""
+        self._known[:, REVIEWED] = self._known[:, INTERVAL]
+
     def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
         if block.values.shape[1:] != self._front.grid_sent:
@@ -215,25 +227,19 @@ class Bank:
             turn = first[first >= 0]
             if len(turn) < FEW:
                 return
-            taken = turn[self._take(block, turn, rows[turn], frames, now)]
+            taken = turn[self._take(block, turn, rows[turn], now)]
             yield taken.tolist()
             left = left[first[rows[left]] != left]
             if len(left):
-                frames.fill(0)  # they have come with the first ones
                 first.fill(-1)
                 first[rows[taken]] = taken
                 left = left[first[rows[left]] >= 0]
 
-    def _take(
-        self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], frames: NDArray[np.intp], now: float
-    ) -> Mask:
-        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did.
-
-        `frames` tells by row how many came with it.
-        """
+    def _take(self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], now: float) -> Mask:
+        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
         front, known, taken = self._front, self._known[rows], np.full(len(rows), not self._by_tag)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
-         usual, scale, active, new, count) = known.T  # fmt: skip
+         usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
         t, tags = np.full(len(rows), now), math.nan if block.tags is None else block.tags[places]
         if self._by_tag:
             since = tags - tag
@@ -270,8 +276,12 @@ class Bank:
             taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else some taxels are bad
             weight = weigh(sigma, level[due, np.newaxis], scale[due, np.newaxis])
 
-        came = frames[rows]
-        jitter += (np.abs(now - arrived - came * interval) - jitter) * (JITTER_SHARE * (came > 0))
+        first = arrived != now  # of those that came together
+        for column, begun in ((before, jitter), (pause, now - arrived), (came, 0.0)):
+            np.copyto(column, begun, where=first)
+        came += 1
+        moved = before + (np.abs(pause - came * expected) - before) * JITTER_SHARE
+        np.copyto(jitter, moved, where=(expected > 0) & (pause < math.inf))
         interval += (since - interval) * SHARE
         news = (sent.view(np.int64) != self._taxels[rows, SENT].view(np.int64)).any(axis=1) | (lively == 0)
         np.copyto(new, t, where=news)

@@ -162,6 +162,7 @@ class Hub:
                 facts.append(Changed(sensor.name, "silent", sensor.owner.source))
                 self._leave(sensor, now, facts)
                 sensor.end(now, facts)
+        self._banks.review()
         return facts
 
     def flush(self, now: float) -> list[Fact]:

@@ -96,8 +96,8 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
             hub.tick(now)  # of sensors in banks, readings are as of the last tick
             for name, reading in sorted(hub.readings(now).items()):
                 baseline = b"" if reading.baseline is None else reading.baseline.tobytes()
-                known.append((name, baseline, counts[name].tolist()))  # frames that come one by one have another jitter
-                known.append(repr(replace(reading, jitter_s=0.0, first=None, baseline=None)))
+                known.append((name, baseline, counts[name].tolist()))
+                known.append(repr(replace(reading, first=None, baseline=None)))
     return said, known
 
 

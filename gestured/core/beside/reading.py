@@ -1,5 +1,6 @@
 """What is known of a sensor: at a moment, for status, metrics and whoever looks at it; and its jitter over time."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,6 +73,8 @@ class Vitals:
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._quietest = np.inf  # counts: the least noise so far
         self.last: float | None = None  # s, when frames came last
+        # Of the frames that came then: the jitter before them, the pause (s, infinite where unknown), and how many.
+        self.together = 0.0, math.inf, 0
         self._began = 0.0  # s, the first frame after the last silence
         self._stretches = 0  # stretches in a row that were shorter than SHORT_S
 
@@ -88,10 +91,14 @@ class Vitals:
         """
         if missed:
             self._stretches = 0
-        if self.last is not None and self.interval_s > 0:
-            self.jitter_s += (abs(now - self.last - frames * self.interval_s) - self.jitter_s) * WEIGHT
         if self.last is None:
             self._began = now
+        if now != self.last:
+            self.together = self.jitter_s, math.inf if self.last is None else now - self.last, 0
+        before, pause, came = self.together
+        self.together = before, pause, came + frames
+        if pause < math.inf and self.interval_s > 0:
+            self.jitter_s = before + (abs(pause - (came + frames) * self.interval_s) - before) * WEIGHT
         self.last = now
 
     def review(self, front_end: FrontEnd) -> None:
