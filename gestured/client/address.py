@@ -14,6 +14,20 @@ UNIX_SOCKETS = Path("/proc/net/unix")
 LISTENS = "00010000"  # the flag of a listening socket there
 
 
+def named(text: str) -> Address:
+    """HOST:PORT, of a host that can be looked up. ValueError, which says what was expected, for anything else.
+
+    Of other names the look-up itself would raise a UnicodeError, wherever it is asked.
+    """
+    address = Address.parse(text)
+    try:
+        if b"\0" not in address.host.encode("idna"):
+            return address
+    except UnicodeError:
+        pass
+    raise ValueError("HOST:PORT with a host's name, each part of which has 1 to 63 characters, or its address")
+
+
 def default_socket(environ: Mapping[str, str]) -> Path:
     """The event socket of a daemon without that setting: in the folder of systemd, of the session, or of root.
 

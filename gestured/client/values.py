@@ -3,13 +3,14 @@
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 
+from gestured.client.address import named
 from gestured.core.address import Address, Grid, is_sensor
 
 
 def host_port(text: str) -> Address:
     """The address of a peer; port 0 is refused. Raises ArgumentTypeError, as all functions here."""
     try:
-        address = Address.parse(text)
+        address = named(text)
         if address.port:
             return address
     except ValueError:
@@ -20,7 +21,7 @@ def host_port(text: str) -> Address:
 def bind_address(text: str) -> Address:
     """An address of our own, where port 0 means any free one."""
     try:
-        return Address.parse(text)
+        return named(text)
     except ValueError as error:
         raise ArgumentTypeError(f"{text!r}: expected {error}") from None
 

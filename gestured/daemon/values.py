@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator
 
+from gestured.client.address import named
 from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
@@ -33,13 +34,13 @@ def expected(problem: Mapping[str, Any]) -> str:
 
 
 def _address(value: object) -> Address:
-    return Address.parse(value if isinstance(value, str) else "")
+    return named(value if isinstance(value, str) else "")
 
 
 def _destination(value: object) -> Destination:
     scheme, _, rest = value.partition("://") if isinstance(value, str) else ("", "", "")
     try:
-        address = Address.parse(rest.rstrip("/"))
+        address = named(rest.rstrip("/"))
         if scheme not in SCHEMES or address.port == 0:
             raise ValueError
     except ValueError:

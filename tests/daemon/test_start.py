@@ -121,6 +121,10 @@ def unread(*flags: object, env: dict[str, str] | None = None) -> str:
     ("flags", "env", "file", "said"),
     [
         (("--listen", "here"), {}, "", ("listen", "'here'", "HOST:PORT", "command line")),
+        (("--listen", f"{'a' * 64}:9000"), {}, "", ("listen", "HOST:PORT", "1 to 63 characters")),
+        (("--metrics", "a..b:9000"), {}, "", ("metrics", "'a..b:9000'", "1 to 63 characters")),
+        (("--publish", "osc://a..b:9000"), {}, "", ("publish.0", "'osc://a..b:9000'", "HOST:PORT")),
+        ((), {}, 'listen = "a\\u0000b:9000"', ("listen", "expected HOST:PORT")),
         ((), {"GESTURED_STALE_S": "soon"}, "", ("stale_s", "'soon'", "number", "environment")),
         ((), {"GESTURED_SOCKETT": "/x"}, "", ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
         ((), {"GESTURED_ALOW": "10.0.0.1"}, "", ("GESTURED_ALOW", "GESTURED_ALLOW")),
