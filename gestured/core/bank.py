@@ -186,7 +186,8 @@ class Bank:
         raw = self._mounted(front.last_sent[np.newaxis])[0]
         cutter.last_raw, cutter.new = raw.tobytes(), new
         front.look = Look(last, raw, above[-1], active, False, False, False)
-        sensor.habits.see(front)  # it learns from the last idle frame before a contact
+        if front.rows != front.columns:
+            sensor.habits.see(front)  # it learns from the last idle frame before a contact
 
     def show(self) -> None:
         """Put what readings tell, and when sensors were heard, into their objects."""

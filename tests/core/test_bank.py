@@ -157,6 +157,25 @@ def test_a_sensor_that_sends_on_is_no_longer_intermittent(monkeypatch: pytest.Mo
     assert said[0] == said[1]
 
 
+def test_a_dip_of_a_moment_does_not_keep_sensors_out_of_a_bank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interference pulls a taxel of each far below its baseline: a second later they are taken together again."""
+    passed, take = list[bool](), Bank._take
+
+    def watched(*given: Any) -> NDArray[np.bool_]:
+        passed.extend(taken := take(*given))
+        return taken
+
+    monkeypatch.setattr(Bank, "_take", watched)
+    rng, hub, alike = np.random.default_rng(0), Hub(SCENE, Sure()), list[int]()
+    for k in range(90):
+        values = rng.normal(100, 2, (EACH, 81))
+        values[:, 40] -= 100.0 * (k == 45)
+        packets = [encoding.message(f"/plain{n}/pressure", "f" * 81, one.tolist()) for n, one in enumerate(values)]
+        hub.receive([(packet, SOURCE) for packet in packets], k / 15)
+        alike.append(passed.count(True))
+    assert alike[44] - alike[34] == alike[89] - alike[79] == 10 * EACH
+
+
 def test_a_sensor_that_sends_is_not_stale_between_two_ticks() -> None:
     """The daemon ticks four times a second, and a sensor may count as gone after less."""
     hub, rng, names = Hub(Scene(GESTURES, (9, 9), stale_s=0.2), Sure()), np.random.default_rng(0), set[str]()
