@@ -65,6 +65,16 @@ def test_a_planted_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     assert not (tmp_path / "a.bin").is_symlink() and (tmp_path / "a.bin").read_bytes() == b"new"
 
 
+@pytest.mark.parametrize("kind", ["pipe", "link"])
+def test_a_device_or_a_pipe_is_left_where_it_is(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "out.npz"
+    os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/null")
+    with pytest.raises(RecordingError, match="cannot be written: is not a regular file"):
+        recording.write(path, session())
+    assert path.is_symlink() if kind == "link" else path.is_fifo()
+    assert os.listdir(tmp_path) == [path.name]
+
+
 def test_the_name_of_what_is_being_written_cannot_be_foreseen(tmp_path: Path) -> None:
     names = set()
     for _ in range(8):

@@ -13,6 +13,7 @@ from typing import BinaryIO
 PRIVATE = 0o600  # whatever is about people: how somebody touches things is personal data
 PUBLIC = 0o644  # what anybody may read, as far as the umask lets them: models, figures, caches of simulated people
 
+NOT_REGULAR = "is not a regular file"
 NAME_BYTES = 8  # chance in the name of a file that is not complete yet
 
 
@@ -30,8 +31,11 @@ def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> It
     """A file to write to that takes the place of `path` in the end, all of it; whatever is raised changes nothing.
 
     It is written beside `path` under a name that nobody can foresee. What is `durable` survives a power cut once
-    this returns; what can be made again, as a cache, need not. Raises OSError.
+    this returns; what can be made again, as a cache, need not. Raises OSError, also where a device or a pipe stands
+    there, which would be gone: as root, /dev/null for everybody.
     """
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, NOT_REGULAR, str(path))
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(NAME_BYTES)}")
     file = create(temporary, mode)
     try:
@@ -74,5 +78,5 @@ def open_regular(path: str | Path) -> BinaryIO:
         raise OSError(errno.EINVAL, str(error), str(path)) from error
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
-        raise OSError(errno.EINVAL, "is not a regular file", str(path))
+        raise OSError(errno.EINVAL, NOT_REGULAR, str(path))
     return file
