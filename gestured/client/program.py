@@ -33,6 +33,8 @@ def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser
 
 def run(parser: Parser, argv: Sequence[str] | None) -> int:
     """Run the subcommand that is asked for: its exit status, 0 after Ctrl-C, 1 and a sentence where it fails."""
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # None where it was closed when we began
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # whose words would stand among those of standard output
     args = parser.parse_args(argv)
     try:
         status: int = args.run(args)
@@ -48,13 +50,8 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
     return status
 
 
-def _give_up(stream: TextIO | None) -> None:
-    """What a stream still holds cannot be written: Python would try at its end, and have a status of its own.
-
-    A stream that was closed when we began is None.
-    """
-    if stream is None:
-        return
+def _give_up(stream: TextIO) -> None:
+    """What a stream still holds cannot be written: Python would try at its end, and have a status of its own."""
     try:
         stream.flush()
     except OSError:

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from gestured.control.cli import SUBCOMMANDS, parser
+from tests.daemon.harness import Daemon
 
 HEAVY = ("pythonosc", "onnxruntime", "gestured.simulator", "gestured.model", "gestured.record.")
 LIGHT = ("gestured.record.judge",)  # needs numpy alone, as all of core does
@@ -67,6 +68,18 @@ def test_an_output_that_takes_nothing_is_one_sentence_and_no_traceback() -> None
 
 def test_an_output_that_is_closed_costs_the_words_alone() -> None:
     assert redirected(">&-", "doctor", "--control", "/nowhere.ctl") == (1, "")
+
+
+def test_an_error_that_nobody_hears_is_not_said_among_the_output() -> None:
+    command = ["sh", "-c", 'exec "$@" 2>&-', "sh", sys.executable, "-m", "gestured.control"]
+    done = subprocess.run([*command, "status", "--json", "--control", "/nowhere.ctl"], stdout=subprocess.PIPE)
+    assert (done.returncode, done.stdout) == (1, b"")
+
+
+def test_who_looks_whether_a_terminal_is_there_finds_none_where_the_output_is_closed(daemon: Daemon) -> None:
+    command = ["timeout", "3", "sh", "-c", 'exec "$@" >&-', "sh", sys.executable, "-m", "gestured.control"]
+    done = subprocess.run([*command, "status", "--watch", "--socket", str(daemon.socket)], stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (124, b"")  # it watches until it is ended
 
 
 def test_an_error_that_cannot_be_said_changes_no_exit_status() -> None:
