@@ -77,6 +77,8 @@ class Csv(Protocol):
     """A sensor that sends a frame as a line of numbers."""
 
     _begun = False  # the first line may be the end of one
+    _counted: bool | None = None  # whether the sensor's lines begin with a counter; None until one came
+    _others = 0  # lines in a row that say otherwise
 
     def push(self, data: bytes) -> list[Reading]:
         """A frame for each line that holds one."""
@@ -84,11 +86,22 @@ class Csv(Protocol):
         for line in self._ended(data, b"\n"):
             reading = reading_of(numbers(line), self.shape, np.dtype(float)) if self._begun else None
             self._begun = True
-            if reading is not None:
+            if reading is not None and self._sound(reading):
                 found.append(reading)
             elif line.strip():
                 self.passed += len(line)
         return found
+
+    def _sound(self, reading: Reading) -> bool:
+        """Whether a line has a counter as those before it: one that lost or won a separator is off by one number.
+
+        A sensor that goes on otherwise is believed once it has said so FEWEST times.
+        """
+        counted = reading.counter is not None
+        self._others = 0 if self._counted in (None, counted) else self._others + 1
+        if self._others in (0, FEWEST):
+            self._counted, self._others = counted, 0
+        return self._counted == counted
 
     @staticmethod
     def fits(data: bytes) -> str | None:

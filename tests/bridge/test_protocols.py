@@ -218,3 +218,25 @@ def test_a_counter_that_falls_elsewhere_began_anew(last: int, then: int):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_documents_say_what_each_is(name: str):
     assert f"| `{name}` |" in (ROOT / "docs" / "connect.md").read_text()
+
+
+def csv_line(n: int, counted: bool) -> bytes:
+    return b" ".join([*([b"%d" % n] if counted else []), *[b"100"] * 16]) + b"\n"
+
+
+@pytest.mark.parametrize("counted", [True, False])
+def test_a_csv_line_that_is_off_by_one_number_is_no_frame(counted: bool) -> None:
+    old, new = (b"100 100\n", b"100100\n") if counted else (b"100\n", b"10 0\n")
+    lines = [csv_line(n, counted) for n in range(8)]
+    damaged = lines[4].removesuffix(old) + new
+    csv = PROTOCOLS["csv"](4, 4)
+    readings = csv.push(b"\n" + b"".join([*lines[:4], damaged, *lines[5:]]))
+    assert [reading.counter for reading in readings] == [n if counted else None for n in (0, 1, 2, 3, 5, 6, 7)]
+    assert all((reading.values == 100).all() for reading in readings) and csv.passed == len(damaged.strip())
+
+
+def test_a_csv_sensor_that_goes_on_with_a_counter_is_believed() -> None:
+    csv = PROTOCOLS["csv"](4, 4)
+    lines = [csv_line(n, counted) for n, counted in enumerate([False] * 3 + [True] * 5)]
+    readings = csv.push(b"\n" + b"".join(lines))
+    assert [reading.counter for reading in readings] == [None] * 3 + [5, 6, 7]
