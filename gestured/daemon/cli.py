@@ -67,6 +67,11 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `gestured`; returns the exit status."""
+    for number in range(3):  # a standard stream that was closed: nothing that is opened later may get its number
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     # Until the loop takes signals: a stop is no failure, and a reload has nothing to reload yet.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)

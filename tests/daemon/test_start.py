@@ -6,6 +6,7 @@ import socket
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from gestured.core.errors import SettingsError
 from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
+from tests.daemon.harness import DEADLINE_S, Client, Daemon, Sensor, lines_of
 from tests.daemon.parts import settings_of
 
 
@@ -108,6 +109,24 @@ def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None
     assert stat.S_IMODE(daemon.socket.parent.stat().st_mode) == 0o700
     assert daemon.client().hello["type"] == "hello"
     assert daemon.stop() == 0
+
+
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
+def test_a_daemon_whose_streams_are_closed_ends_as_asked(tmp_path: Path, closed: str) -> None:
+    events = tmp_path / "e.sock"
+    flags = ["--listen", "127.0.0.1:0", "--socket", str(events), "--own-gestures", str(tmp_path / "own.json")]
+    command = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-m", "gestured.daemon", *flags]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + DEADLINE_S
+        while not events.exists() and time.monotonic() < end:
+            time.sleep(0.02)
+        assert Client(events).hello["type"] == "hello"  # its loop turns, and takes signals
+        process.terminate()
+        assert process.wait(DEADLINE_S) == 0
+    finally:
+        process.kill()
+        process.wait()
 
 
 def unread(*flags: object, env: dict[str, str] | None = None) -> str:
