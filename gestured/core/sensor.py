@@ -265,8 +265,7 @@ class Sensor:
     @property
     def calm(self) -> bool:
         """Whether an idle frame says nothing but that the sensor is idle; see `FrontEnd.calm`."""
-        falls = self.habits.falling and not self._square  # idle frames of a square one say nothing of that
-        waits = self._listening.armed or self._foresight.wanted is not None or falls
+        waits = self._listening.armed or self._foresight.wanted is not None or self.habits.falling
         return self.front_end.calm and not waits and not self._scene.frames
 
     def run(self, act: Callable[["Sensor"], Sequence[Told] | None], now: float, facts: list[Fact]) -> None:

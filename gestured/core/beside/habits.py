@@ -27,9 +27,14 @@ class Habits:
         self.falls = self.rises = 0  # contacts in which counts fell below the baseline, and in which they rose
         self.exchanges = self.fits = 0  # contacts that look like one finger with R and C exchanged, and as they are
         self._fell = -np.inf  # s, the last frame that lay below the baseline
-        self.falling = False  # whether a contact in which counts fell is not over
+        self._falling = False  # whether a contact in which counts fell is not over
         self._idle: Counts | None = None  # (R, C) the last frame without a contact
         self._strongest: tuple[float, Counts | None] = 0.0, None  # the contact's strongest frame: activity, and (R, C)
+
+    @property
+    def falling(self) -> bool:
+        """Whether idle frames are to end a contact in which counts fell. Those of a square grid say nothing of that."""
+        return self._falling and self._rows != self._columns
 
     @property
     def inverted(self) -> bool:
@@ -45,7 +50,7 @@ class Habits:
         """Hear what a front end has found of a contact."""
         if isinstance(found, Opened):
             self.rises += 1
-            self._strongest, self.falling = (0.0, None), False
+            self._strongest, self._falling = (0.0, None), False
         elif isinstance(found, Cut) or (isinstance(found, Void) and found.reason == "stuck"):
             self._compare()
 
@@ -58,7 +63,7 @@ class Habits:
             if self.paused(look.t):
                 self.falls += 1
                 self._strongest = 0.0, None
-            self._fell, self.falling = look.t, True
+            self._fell, self._falling = look.t, True
             self._press(shown, fallen)
         if front_end.segmenter.phase.pending:
             self._press(shown, look.activity)
@@ -69,8 +74,8 @@ class Habits:
         """Whether no contact in which counts fell goes on at `t` s; one that is over is compared."""
         if t - self._fell <= PAUSE_S:
             return False
-        if self.falling:
-            self.falling = False
+        if self._falling:
+            self._falling = False
             self._compare()
         return True
 
