@@ -100,6 +100,7 @@ def page(control: Path) -> Iterator[str]:
             yield process.stdout.readline().strip() if process.stdout is not None else ""
         finally:
             process.terminate()
+            process.wait()  # after Ctrl-C `Popen` itself waits for a quarter of a second at most
 
 
 def pad(engine: Engine, grid: tuple[int, int], rate_hz: float) -> PadServer:
