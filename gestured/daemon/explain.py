@@ -8,7 +8,8 @@ from gestured.client.address import control_beside, default_socket
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.daemon.asked import open_ladder, outputs_of, scene_of
-from gestured.daemon.clients import BACKLOG_BYTES, CLIENTS
+from gestured.daemon.client import BACKLOG_BYTES
+from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S

@@ -13,6 +13,7 @@ from gestured.core import messages
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Onset
 from gestured.core.messages import Subscription
+from gestured.daemon import client as one_client
 from gestured.daemon import clients
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
@@ -125,7 +126,7 @@ async def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
         client.subscription = Subscription()
         for i in range(5000):
             client.send(b"%06d" % i + b"." * 493 + b"\n")
-            assert client.backlog <= clients.BACKLOG_BYTES + 500
+            assert client.backlog <= one_client.BACKLOG_BYTES + 500
         lines = (await heard(sock, b"004999")).split(b"\n")[:-1]
         numbers = [int(line[:6]) for line in lines if not line.startswith(b"{")]
         lost = [json.loads(line)["count"] for line in lines if line.startswith(b"{")]
@@ -179,7 +180,7 @@ async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> 
         turn_of.append(now)
         raise ProtocolError("subscription", "rubbish")
 
-    monkeypatch.setattr(clients, "parse_subscription", parse)
+    monkeypatch.setattr(one_client, "parse_subscription", parse)
     server = serve(listener)
     socks = [connect(listener) for _ in range(40)]
     for sock in socks:
@@ -191,7 +192,7 @@ async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> 
             for _ in range(10):
                 now += 1
                 await asyncio.sleep(0)
-        assert 40 < len(turn_of) <= 40 * clients.TURNS * seconds
+        assert 40 < len(turn_of) <= 40 * one_client.TURNS * seconds
         server.tick()
     assert max(map(turn_of.count, set(turn_of))) <= clients.LINES
     for sock in socks:
@@ -201,7 +202,7 @@ async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> 
 
 @pytest.mark.parametrize("rubbish", [b"?\n" * 400, b"[" * 1000])
 async def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch, rubbish: bytes) -> None:
-    monkeypatch.setattr(clients, "RUBBISH", 50)
+    monkeypatch.setattr(one_client, "RUBBISH", 50)
     metrics = Metrics()
     server = serve(listener, metrics)
     with connect(listener) as rude, connect(listener) as clumsy:

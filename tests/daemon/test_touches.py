@@ -11,7 +11,7 @@ import pytest
 
 from gestured.core.events import Touch
 from gestured.core.messages import Subscription
-from gestured.daemon.clients import BACKLOG_BYTES
+from gestured.daemon.client import BACKLOG_BYTES
 from tests.daemon.harness import Client, Sensor
 from tests.daemon.test_clients import connect, heard, listener, serve, turn  # noqa: F401 - a fixture among them
 
