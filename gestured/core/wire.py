@@ -116,10 +116,13 @@ class _Route(NamedTuple):
     fault: tuple[str, str] | None  # reason and text of the ProtocolError, where the address or its type tags are wrong
 
 
-# Of packets of one layout that hold one frame, and beside it nothing that is wanted: the frame's route, the place of
-# its message, the type of its values as they are sent, and a number that is the same for packets whose frames stand in
-# the same place, of the same type and grid.
-_Meaning = tuple[_Route, Slot, np.dtype[Any], int]
+class _Meaning(NamedTuple):
+    """What packets of one layout hold that have one frame, and beside it nothing that is wanted."""
+
+    route: _Route
+    slot: Slot  # of the frame's message
+    dtype: np.dtype[Any]  # of the frame's values as they are sent
+    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
 
 
 class Decoder:
@@ -179,7 +182,7 @@ class Decoder:
                 if meaning is None:
                     meaning = layout.meaning = self._meaning(layout)
                 if meaning:
-                    alike.setdefault(meaning[-1], []).append((i, meaning))
+                    alike.setdefault(meaning.form, []).append((i, meaning))
         found: dict[tuple[object, ...], list[Block]] = {}
         for members in alike.values():
             if len(members) >= FEW:
@@ -203,7 +206,7 @@ class Decoder:
         form = layout.length, bundled, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        return route, slot, dtype, self._forms.setdefault(form, next(self._numbers))
+        return _Meaning(route, slot, dtype, self._forms.setdefault(form, next(self._numbers)))
 
     def _find_route(self, address: str, types: str) -> _Route:
         matched = self._addresses.match(address)
@@ -303,7 +306,7 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
     if slot.start:  # alone, a message begins at 0
         tags = osc.timetags(block[:, 8:16])
     found = Block(
-        [i for i, _ in members], [route.sensor for _, (route, *_) in members],
+        [i for i, _ in members], [meaning.route.sensor for _, meaning in members],
         values.reshape(-1, *route.grid), counters, tags,
     )  # fmt: skip
     return found if good.all() else found.only(good.nonzero()[0])
