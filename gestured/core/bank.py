@@ -34,8 +34,14 @@ Mask = NDArray[np.bool_]
 FEW = 6  # frames from which on taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # frames of which times are kept, at least; a multiple of any depth
-KNOWN = 22  # numbers that are known of each sensor, as `Bank.enter` puts them
-INTERVAL, REVIEWED = 4, 18  # of those: the interval as it is, and as of the last tick
+# The numbers that are known of each sensor, by name; `Bank.enter` says where each of them is kept otherwise.
+NAMES = (
+    "last", "arrived", "tag", "counter", "interval", "jitter",
+    "glance", "learned", "quieter", "lively", "reviewed", "step", "level",
+    "usual", "scale", "active", "new", "count",
+    "expected", "before", "pause", "came",
+)  # fmt: skip
+KNOWN = np.dtype([(name, np.float64) for name in NAMES])
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # of each taxel: `Idle`, `Conditioner`; the last frame as it was sent
 
 
@@ -117,7 +123,7 @@ class Bank:
         self._rows: dict[str, int] = {}
         self._owners: dict[str, Source] = {}
         self._free = list(range(FIRST_ROWS))
-        self._known = np.zeros((FIRST_ROWS, KNOWN))
+        self._known = np.zeros(FIRST_ROWS, KNOWN)
         self._taxels = np.zeros((FIRST_ROWS, 5, taxels))
         self._above = np.zeros((FIRST_ROWS, depth, taxels))  # of the last frames, of which the cutter keeps some
         self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s of each: time, `Kept.new`, interval
@@ -157,7 +163,7 @@ class Bank:
         del self._owners[name]
         self._free.append(row)
         (last, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
-         usual, scale, active, new, count, _, *together) = self._known[row].tolist()  # fmt: skip
+         usual, scale, active, new, count, _, *together) = self._known[row].item()  # fmt: skip
         if not count:
             return
         front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
@@ -192,7 +198,7 @@ class Bank:
     def show(self) -> None:
         """Put what readings tell, and when sensors were heard, into their objects."""
         rows = list(self._rows.values())
-        known = self._known[rows][:, [0, 1, 4, 5, 12]].tolist()
+        known = self._known[["last", "arrived", "interval", "jitter", "level"]][rows].tolist()
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
             self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
         ):
@@ -203,7 +209,7 @@ class Bank:
 
     def review(self) -> None:
         """All sensors were reviewed: jitter is told by their intervals as they are now."""
-        self._known[:, REVIEWED] = self._known[:, INTERVAL]
+        self._known["expected"] = self._known["interval"]
 
     def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
@@ -218,9 +224,10 @@ class Bank:
         if not self._by_tag:
             mine &= frames[rows] == 1  # several share their time
         elif block.tags is not None and (several := (mine & (frames[rows] > 1)).nonzero()[0]).size:
+            # A sensor whose clock is coarse gives several of its frames one time; it spaces these by itself.
             of = np.column_stack((rows[several], block.tags[several]))
             of = of[np.lexsort(of.T)]
-            mine &= ~np.isin(rows, of[1:][(of[1:] == of[:-1]).all(axis=1), 0])  # the same, where a clock is coarse
+            mine &= ~np.isin(rows, of[1:][(of[1:] == of[:-1]).all(axis=1), 0])
         left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
         while len(left) >= FEW:
             first.fill(-1)
@@ -240,7 +247,7 @@ class Bank:
         """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
         front, known, taken = self._front, self._known[rows], np.full(len(rows), not self._by_tag)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
-         usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
+         usual, scale, active, new, count, expected, before, pause, came) = map(known.__getitem__, NAMES)  # fmt: skip
         t, tags = np.full(len(rows), now), math.nan if block.tags is None else block.tags[places]
         if self._by_tag:
             since = tags - tag
