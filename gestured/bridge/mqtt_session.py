@@ -51,7 +51,7 @@ class Mqtt:
         gate = None if self._gate is None else self._gate.name
         self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
         self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
-        self._obeying = threading.Lock()  # held while a command is put there, or taken from there
+        self._obeying = threading.Lock()  # held while a command is put into `_commands`, or taken from it
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # a signal handler may put into it
         self._stopping = False
         self._client: Any = None  # of this connection, from the call on; None while there is none

@@ -78,7 +78,7 @@ class Csv(Protocol):
 
     _begun = False  # the first line may be the end of one
     _counted: bool | None = None  # whether the sensor's lines begin with a counter; None until one came
-    _others = 0  # lines in a row that say otherwise
+    _others = 0  # lines in a row that are not as `_counted` says
 
     def push(self, data: bytes) -> list[Reading]:
         """A frame for each line that holds one."""
@@ -95,7 +95,7 @@ class Csv(Protocol):
     def _sound(self, reading: Reading) -> bool:
         """Whether a line has a counter as those before it: one that lost or won a separator is off by one number.
 
-        A sensor that goes on otherwise is believed once it has said so FEWEST times.
+        A sensor that changes is believed at the FEWEST-th such line in a row.
         """
         counted = reading.counter is not None
         self._others = 0 if self._counted in (None, counted) else self._others + 1

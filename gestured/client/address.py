@@ -17,7 +17,7 @@ LISTENS = "00010000"  # the flag of a listening socket there
 def named(text: str) -> Address:
     """HOST:PORT, of a host that can be looked up. ValueError, which says what was expected, for anything else.
 
-    Of other names the look-up itself would raise a UnicodeError, wherever it is asked.
+    A name that cannot be written for a look-up, such as `a..b`, would raise UnicodeError later, where it is used.
     """
     address = Address.parse(text)
     try:

@@ -47,7 +47,7 @@ class Control(Lines):
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """While what the daemon has said is read: Refused for what another version, or another program, says."""
+        """Read the daemon's lines inside of this: what is missing or odd in one, as of another version, is Refused."""
         try:
             yield
         except (KeyError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:

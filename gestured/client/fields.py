@@ -37,7 +37,7 @@ def _is_where(value: Any) -> bool:
 
 
 def _is_gates(value: Any) -> bool:
-    """What is said of a sensor that a gate silences, or that a gesture arms; see `messages.listening`."""
+    """Whether a value says of a sensor which gates are closed, whether it is armed, and until when."""
     if not isinstance(value, dict) or not _is_texts(value.get("closed", [])):
         return False
     until = value.get("until")

@@ -33,8 +33,9 @@ def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser
 
 def run(parser: Parser, argv: Sequence[str] | None) -> int:
     """Run the subcommand that is asked for: its exit status, 0 after Ctrl-C, 1 and a sentence where it fails."""
-    sys.stdout = sys.stdout or open(os.devnull, "w")  # None where it was closed when we began
-    sys.stderr = sys.stderr or open(os.devnull, "w")  # whose words would stand among those of standard output
+    # A stream that was closed when we began is None.
+    sys.stdout = sys.stdout or open(os.devnull, "w")
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # else `print` would write its sentences to standard output
     args = parser.parse_args(argv)
     try:
         status: int = args.run(args)
@@ -51,7 +52,7 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
 
 
 def _give_up(stream: TextIO) -> None:
-    """What a stream still holds cannot be written: Python would try at its end, and have a status of its own."""
+    """Write what a stream still holds, or drop it: else Python tries again as it exits, and exits with status 120."""
     try:
         stream.flush()
     except OSError:

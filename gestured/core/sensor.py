@@ -62,7 +62,9 @@ class Sensor:
         self._scene, self._decision = scene, Decision(scene, name)
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self.stamper = Stamper(scene.clock_of(name))
-        self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = None  # who, last; of what; the answers
+        self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = (
+            None  # the last one, of what, and its answers
+        )
         self.shown: Segment | None = None  # what `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
@@ -202,7 +204,7 @@ class Sensor:
         recognised = best if known or own is not None else None
         why = listening.refusal(segment.onset, recognised)
         if why is None and recognised is None:
-            # A sensor that is too slow or too fast explains it first.
+            # At a rate that the model does not know, holes and low confidence follow from the rate, so that is told.
             why = "rate" if outside(self.front_end.rate_hz) else "confidence" if seen else "hole"
         if why is not None:
             gates = listening.silenced if why == INHIBITED else ()

@@ -73,7 +73,8 @@ class Vitals:
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._quietest = np.inf  # counts: the least noise so far
         self.last: float | None = None  # s, when frames came last
-        # Of the frames that came then: the jitter before them, the pause (s, infinite where unknown), and how many.
+        # Of the frames that arrived at `last`: the jitter before them, the pause before them in s (infinite where it is
+        # unknown), and how many they are so far.
         self.together = 0.0, math.inf, 0
         self._began = 0.0  # s, the first frame after the last silence
         self._stretches = 0  # stretches in a row that were shorter than SHORT_S
