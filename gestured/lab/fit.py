@@ -6,10 +6,9 @@ the split (`augment`), and some of its windows are cut short (`prefixes`). Nothi
 networks are told how long each window is.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -17,12 +16,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
+from gestured.lab.checkpoints import restore, store
 from gestured.lab.nets import CnnLstm, Lstm, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
@@ -174,18 +173,12 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
             _fit_scale(net, samples, chosen, config)
     steps = config.epochs * len(list(_plan(samples, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
-    parts: dict[str, Any] = {"nets": nets, "optimiser": optimiser, "schedule": schedule}
-    done = 0
-    if checkpoint.exists():
-        kept = torch.load(checkpoint, weights_only=True)
-        done = kept["epochs"]
-        for name, part in parts.items():
-            part.load_state_dict(kept[name])
+    done = restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):
         one_epoch(
             nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}"
         )
-        save(checkpoint, {name: part.state_dict() for name, part in parts.items()} | {"epochs": epoch + 1})
+        store(checkpoint, nets, optimiser, epoch + 1)
     return nets
 
 
@@ -265,16 +258,9 @@ def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
     return dict(zip(nets, found, strict=True))
 
 
-def save(path: Path, state: Mapping[str, Any]) -> None:
-    """Write a state, such as the weights of networks, all or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
-        torch.save(state, file)
-
-
 def load_nets(path: Path) -> nn.ModuleDict:
-    """The networks whose weights `save` wrote into a file."""
-    state = torch.load(path, weights_only=True)
-    nets = build(dict.fromkeys(name.split(".")[0] for name in state))
-    nets.load_state_dict(state)
+    """The networks that `save_nets` wrote into a file."""
+    with np.load(path, allow_pickle=False) as stored:
+        nets = build(dict.fromkeys(name.split(".")[0] for name in stored.files))
+        nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})
     return nets

@@ -21,12 +21,13 @@ from torch import Tensor, nn
 import gestured
 from gestured.core.points import USUAL
 from gestured.lab.adapt.material import own_recordings
+from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import DAY_S, OTHER_TRIALS, TRIALS, meant_on, recorded, simulated
 from gestured.lab.decide import calibration_of, confidence, decided, fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.early import Foretold
 from gestured.lab.export import Facts, export_forest, export_net, write_manifest
-from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, save, targets
+from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, targets
 from gestured.lab.forest import grow_forest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.points import by_strictness, operating_points
@@ -194,9 +195,9 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
     """Both stages and the folds of these networks; what is done already is read from the cache."""
     told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest(), names])
     key = hashlib.sha256(told.encode()).hexdigest()[:12]
-    first = cache / f"simulated-{key}.pt"
+    first = cache / f"simulated-{key}.npz"
     if not first.exists():
-        save(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.pt", names).state_dict())
+        save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz", names))
     start = load_nets(first)
     if data.real is None:
         return Trained(start, None)
@@ -204,18 +205,18 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
     held_out = {name: torch.zeros(len(data.real), len(CLASSES)) for name in start}
     apart: list[nn.ModuleDict] = []
     for k, held in enumerate(folds(data.real)):
-        seen, path = data.real.take(~held), cache / f"fold{k}-{key}.pt"
+        seen, path = data.real.take(~held), cache / f"fold{k}-{key}.npz"
         apart.append(_kept(path, start, data, seen, plan, f"fold {k + 1}/{FOLDS}"))
         for name, found in logits(apart[-1], data.real.take(held)).items():
             held_out[name][torch.from_numpy(held)] = found
-    return Trained(_kept(cache / f"final-{key}.pt", start, data, data.real, plan, "final"), held_out, apart)
+    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart)
 
 
 def _kept(
     path: Path, start: nn.ModuleDict, data: TrainingData, real: Samples, plan: TrainingPlan, title: str
 ) -> nn.ModuleDict:
     if not path.exists():
-        save(path, finetune(start, data.teach, real, plan.fit, title).state_dict())
+        save_nets(path, finetune(start, data.teach, real, plan.fit, title))
     return load_nets(path)
 
 

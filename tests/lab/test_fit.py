@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from gestured.lab import dataset, fit, train
+from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
@@ -18,6 +19,7 @@ from gestured.lab.fit import (
     balanced,
     build,
     finetune,
+    load_nets,
     logits,
     padded,
     pretrain,
@@ -77,7 +79,7 @@ def whole(samples: Samples, tmp_path_factory: pytest.TempPathFactory) -> tuple[n
     real = fit.one_epoch
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fit, "one_epoch", lambda *a: losses.append(real(*a)) or losses[-1])
-        return pretrain(samples, SMALL, tmp_path_factory.mktemp("whole") / "checkpoint.pt"), losses
+        return pretrain(samples, SMALL, tmp_path_factory.mktemp("whole") / "checkpoint.npz"), losses
 
 
 @pytest.mark.parametrize("after", [0, 2])
@@ -85,7 +87,7 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(
     samples: Samples, whole: tuple[nn.ModuleDict, list[float]], tmp_path: Path, after: int
 ) -> None:
     """Training is the same every time, whatever was drawn before it, and with the same dropout."""
-    alike(interrupted(samples, tmp_path / "parts.pt", after), whole[0])
+    alike(interrupted(samples, tmp_path / "parts.npz", after), whole[0])
 
 
 def test_training_changes_every_net_and_lowers_the_loss(whole: tuple[nn.ModuleDict, list[float]]) -> None:
@@ -94,6 +96,14 @@ def test_training_changes_every_net_and_lowers_the_loss(whole: tuple[nn.ModuleDi
     assert losses[-1] < losses[0]
     for name, value in before.items():
         assert not np.array_equal(value, after[name]), name
+
+
+def test_weights_survive_the_file(samples: Samples, tmp_path: Path) -> None:
+    torch.manual_seed(3)
+    nets = build()
+    save_nets(tmp_path / "new" / "nets.npz", nets)
+    alike(nets, load_nets(tmp_path / "new" / "nets.npz"))
+    assert [p.name for p in (tmp_path / "new").iterdir()] == ["nets.npz"]
 
 
 def test_every_sample_is_learned_from_once_an_epoch(samples: Samples) -> None:
