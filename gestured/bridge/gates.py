@@ -28,7 +28,7 @@ class Gate:
         self._path, self._counts = path, counts
         self._said = ""  # why the last command failed
         self._due = 0.0  # monotonic s, when what is closed is repeated
-        self._obeyed = False  # whether the daemon did as asked since its last status; the next may be older than that
+        self._answered = 0.0  # s since 1970, when the daemon last did as asked
 
     def obey(self, sensor: str, command: str) -> list[str]:
         """Carry out a command; returns the gates of the sensor that are closed now. Raises GesturedError."""
@@ -39,7 +39,7 @@ class Gate:
                     answer = control.ask("inhibit", **which, seconds=ALIVE_S)
                 else:
                     answer = control.ask("allow", **which)
-                self._obeyed = True
+                self._answered = time.time()
                 closed = answer.get("sensors")
                 closed = closed.get(sensor) if isinstance(closed, dict) else None
                 if not isinstance(closed, list) or not all(isinstance(name, str) for name in closed):
@@ -52,13 +52,13 @@ class Gate:
                 self._counts.say(f"{sensor} {command}: {error}")
             raise
 
-    def repeat(self, closed: Iterable[str]) -> None:
-        """Repeat, now and then, that the gate is closed for these sensors, as a status of the daemon has just said.
+    def repeat(self, closed: Iterable[str], told: float) -> None:
+        """Repeat, now and then, that the gate is closed for these sensors, as the daemon's status of `told` says.
 
-        A status that was on its way while a gate was opened says that it is closed; to repeat that would close it.
+        A status that is older than the daemon's last answer, `told` in s since 1970, may say of a gate that it is
+        closed which has been opened since; to repeat that would close it. Several wait where the daemon was slow.
         """
-        obeyed, self._obeyed = self._obeyed, False
-        if obeyed or time.monotonic() < self._due:
+        if 0.0 <= self._answered - told < ALIVE_S or time.monotonic() < self._due:  # a clock may have been set back
             return
         self._due = time.monotonic() + REPEAT_S
         for sensor in closed:

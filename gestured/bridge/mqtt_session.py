@@ -109,7 +109,7 @@ class Mqtt:
             topic = topic_of(self._host, line["sensor"], line["type"])
             self._waiting.append(Outgoing(decided, topic, self._daemon.payload(line)))
         if self._gate is not None and self._connected and line["type"] == STATUS:
-            self._gate.repeat(self._daemon.silent_by(self._gate.name))
+            self._gate.repeat(self._daemon.silent_by(self._gate.name), line["time"])
         self._changed |= line["type"] in ("hello", "gestures", STATUS, GONE)
         self._send()
 

@@ -3,6 +3,7 @@
 import json
 import socket
 import threading
+import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -137,22 +138,26 @@ def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daem
     with Control(Path(gated.ready["control"])) as operator:
         wait(lambda: operator.ask("status")["overdue"])
         monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 60.0)
-        gate.repeat(["armrest"])  # as a status says that was on its way
-        gate.repeat(["armrest"])
+        gate.repeat(["armrest"], time.time())
         assert operator.ask("status")["overdue"] == {}
         operator.ask("allow", gate="mqtt")
-        gate.repeat(["armrest"])  # too soon
+        gate.repeat(["armrest"], time.time())  # too soon
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
 
 
-def test_a_status_that_was_on_its_way_closes_no_gate_that_the_bus_has_opened(gated: Daemon) -> None:
+def test_what_the_daemon_said_before_closes_no_gate_that_the_bus_has_opened(gated: Daemon) -> None:
     known(gated)
     gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
     gate.obey("armrest", OFF)
+    told = time.time()
     assert gate.obey("armrest", ON) == []
-    gate.repeat(["armrest"])  # the daemon had written its status before
+    for second in (1.0, 0.0):  # the daemon was slow, and had written two while it was asked
+        gate.repeat(["armrest"], told - second)
     with Control(Path(gated.ready["control"])) as operator:
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
+    gate.repeat(["armrest"], told + 3600.0)  # the clock was set, and it is closed by somebody else in its name
+    with Control(Path(gated.ready["control"])) as operator:
+        assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["mqtt"]
 
 
 @pytest.mark.parametrize(
