@@ -87,7 +87,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if explain:
             from gestured.daemon.explain import explain as describe
 
-            print(describe(settings, sources))
+            try:
+                with open(log.STDOUT, "w", closefd=False) as out:  # of Python's own, what is left is tried again at exit
+                    print(describe(settings, sources), file=out)
+            except BrokenPipeError:
+                pass  # its reader has enough, as `head` does
+            except OSError as error:
+                log.print_log(f"gestured: standard output cannot be written: {error.strerror}")
+                return 1
             return 0
         from gestured.daemon.start import run
 

@@ -129,6 +129,18 @@ def test_a_daemon_whose_streams_are_closed_ends_as_asked(tmp_path: Path, closed:
         process.wait()
 
 
+def test_what_explain_says_to_a_full_disk_or_to_nobody_is_no_traceback(model: Path) -> None:
+    command = [sys.executable, "-m", "gestured.daemon", "--model", str(model), "--explain"]
+    full = subprocess.run(["sh", "-c", 'exec "$@" >/dev/full', "sh", *command], stderr=subprocess.PIPE, text=True)
+    said = "gestured: standard output cannot be written: No space left on device\n"
+    assert (full.returncode, full.stderr) == (1, said)
+    reader, writer = os.pipe()
+    os.close(reader)
+    nobody = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert (nobody.returncode, nobody.stderr) == (0, "")
+
+
 def unread(*flags: object, env: dict[str, str] | None = None) -> str:
     """What is said of flags, variables and a file that are no settings, before anything is started."""
     with pytest.raises(SettingsError) as found:
