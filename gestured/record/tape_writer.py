@@ -29,14 +29,20 @@ class Writer:
         except OSError as error:
             raise RecordingError(f"{path}: cannot be made: {error.strerror}") from error
         self._mcap: Any = Mcap(self._file, chunk_size=CHUNK_BYTES)
-        self._mcap.start(profile="gestured", library="gestured")
-        self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
-        schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())
-        self._events = self._mcap.register_channel(EVENTS, "json", schema)
         self._senders: dict[str, int] = {}
         self._waiting = 0  # bytes that are not in the file yet
         self._broken = False  # the file took no more
-        self.flush()
+        try:
+            with self._writing():
+                self._mcap.start(profile="gestured", library="gestured")
+                self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
+                schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())
+                self._events = self._mcap.register_channel(EVENTS, "json", schema)
+            self.flush()
+        except RecordingError:  # a file that is there and holds nothing would refuse the next attempt
+            self.close()
+            path.unlink()
+            raise
 
     @property
     def full(self) -> bool:

@@ -60,6 +60,19 @@ def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypat
     assert tape_reader.read(path).packets[0].data == b"one"
 
 
+@pytest.mark.parametrize("note", ["", "a" * 100_000])  # of what is written at once, and of what waits
+def test_a_tape_for_which_there_is_no_room_at_all_leaves_no_file(tmp_path: Path, note: str) -> None:
+    path = tmp_path / "a.mcap"
+    code = (
+        "import resource, sys; from pathlib import Path; from gestured.record.tape_writer import Writer\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))  # what a full disk says by ENOSPC is said by EFBIG\n"
+        f"Writer(Path(sys.argv[1]), {SCENE | {'note': note}!r}, 1 << 30)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], stderr=subprocess.PIPE, text=True)
+    assert done.stderr.splitlines()[-1].endswith(f"{path}: cannot be written: File too large; good up to there")
+    assert not path.exists()
+
+
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
 def test_a_recording_is_written_whole_or_the_old_one_stays(tmp_path: Path, monkeypatch, number: int) -> None:
     path = tmp_path / "a.npz"
