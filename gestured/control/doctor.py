@@ -175,7 +175,10 @@ def _port(address: Address) -> Finding:
 
 
 def _permissions(path: Path) -> Finding:
-    mode = path.stat().st_mode
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        return Finding("bad", f"control socket {path}: {error.strerror}, since it answered", "restart the daemon")
     if mode & 0o007:
         return Finding("warn", f"control socket {path}: open to everybody", f"chmod o= {path}")
     return Finding("ok", f"control socket {path}: mode {stat.S_IMODE(mode):04o}")

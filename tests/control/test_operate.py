@@ -205,6 +205,8 @@ def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
     for mode, level in ((0o660, "ok"), (0o666, "warn")):
         limit.chmod(mode)
         assert _permissions(limit).level == level
+    gone = _permissions(tmp_path / "gone.ctl")  # since it answered
+    assert gone.level == "bad" and "gone.ctl: No such file" in gone.what and gone.remedy
     with socket.socket(type=socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         found = _port(Address(*taken.getsockname()))
