@@ -211,6 +211,7 @@ class Subscriber:
             self._selector.unregister(source.lines.socket)
             source.lines.close()
         source.lines, source.hello = None, {}
+        self._unread = deque(line for line in self._unread if line[0] is not source)  # they are of no connection now
         source.begun.clear()
         source.due = time.monotonic() + source.wait_s
         source.wait_s = min(2.0 * source.wait_s, LONGEST_S)

@@ -78,7 +78,7 @@ def test_what_a_daemon_could_not_finish_is_not_given(fake: FakeDaemon):
 
 def test_a_daemon_without_a_place_is_asked_again(fake: FakeDaemon):
     def crowd() -> None:
-        fake.accept({"type": "error", "reason": "more than 64 clients"})
+        fake.accept(b'{"type":"error","reason":"more than 64 clients"}\n{"type":"status"}\n')
         fake.close()
         fake.accept()
         fake.say(GESTURE)
