@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 MOST_TAXELS = 64 * 64  # of the largest grid
 LINE_BYTES = 32 * MOST_TAXELS  # of the longest packet or line; numbers in text have up to some 25 characters
 WIDTHS = (8, 16)  # bits of a counter in firmware; one of 32 bits wraps as OSC's does
+LARGEST = float(np.finfo(np.float32).max)  # of a count: it goes to the daemon as float32
 NEAR = 16  # frames that may be lost where a counter wraps; one that falls further began anew
 FEWEST = 3  # frames of another protocol that are no accident
 
@@ -91,7 +92,7 @@ def reading_of(found: Sequence[object], shape: tuple[int, int], dtype: np.dtype[
     if extra not in (0, 1):
         return None
     values = np.array(found[extra:], dtype=dtype.newbyteorder("=")).reshape(shape)
-    if not np.isfinite(values).all():
+    if not (abs(values.astype(float)) <= LARGEST).all():  # nor are infinities, and what is no number
         return None
     if extra == 0:
         return Reading(values)

@@ -240,3 +240,10 @@ def test_a_csv_sensor_that_goes_on_with_a_counter_is_believed() -> None:
     lines = [csv_line(n, counted) for n, counted in enumerate([False] * 3 + [True] * 5)]
     readings = csv.push(b"\n" + b"".join(lines))
     assert [reading.counter for reading in readings] == [None] * 3 + [5, 6, 7]
+
+
+@pytest.mark.parametrize("number", [b"1e39", b"-1e300", b"inf", b"nan"])
+def test_a_csv_number_that_no_frame_can_hold_is_in_none(number: bytes) -> None:
+    csv = PROTOCOLS["csv"](4, 4)
+    assert csv.push(b"\n" + csv_line(0, False).replace(b"100", number, 1)) == []
+    assert csv.passed > 0
