@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.daemon.explain import explain as describe
 
             try:
-                with open(log.STDOUT, "w", closefd=False) as out:  # of Python's own, what is left is tried again at exit
+                with open(log.STDOUT, "w", closefd=False) as out:  # Python would try its own again at exit
                     print(describe(settings, sources), file=out)
             except BrokenPipeError:
                 pass  # its reader has enough, as `head` does
