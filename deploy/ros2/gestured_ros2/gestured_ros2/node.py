@@ -108,7 +108,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
             elif line["type"] == "status":
                 self._send(self._status, line)
                 if self._gate is not None:
-                    self._gate.repeat(self._daemon.silent_by(self._gate.name))
+                    self._gate.repeat(self._daemon.silent_by(self._gate.name), line["time"])
             elif line["type"] == GONE:
                 self._say_gone()
             for sensor in self._daemon.states:  # before its first gesture, so that it has listeners then
