@@ -29,7 +29,7 @@ from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.daemon import log
 from gestured.daemon.asked import scene_of
-from gestured.daemon.backlog import Backlog, Datagram
+from gestured.daemon.backlog import Backlog
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load_settings
 from gestured.lab.progress import progress
@@ -121,10 +121,10 @@ class Bench:
                     if states is not None:
                         states += [(tick, reading.state) for reading in hub.readings(tick).values()]
                 tick += TICK_S
-            backlog.add([Datagram(t, packet, SOURCE) for t, packet in found])
+            times, packets = zip(*found, strict=True)
+            backlog.add([(packet, SOURCE) for packet in packets], times)
             while backlog:
-                group = backlog.group()
-                facts += hub.receive([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)
+                facts += hub.receive(*backlog.group())
                 facts += hub.tick(min(now, backlog.oldest))
         facts += hub.flush(now)
         return [json.loads(messages.to_json(fact, 0.0)) for fact in facts if isinstance(fact, Event)]

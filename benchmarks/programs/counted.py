@@ -42,9 +42,9 @@ def counted(receiver: Receiver) -> None:
 def taken(receiver: Receiver) -> Any:
     """In the place of `Receiver._receive`."""
     global found
-    packets, full = receive(receiver)
+    packets, stamps, full = receive(receiver)
     found += len(packets)
-    return packets, full
+    return packets, stamps, full
 
 
 setattr(Receiver, "read", counted)  # noqa: B010

@@ -9,6 +9,8 @@ the last bit: `matmul` of a stack of grids gives what `dot` gives of each, and e
 import math
 from collections.abc import Iterator, Sequence
 from itertools import repeat
+from operator import eq
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,17 @@ from gestured.core.conditioning import Look, weigh
 from gestured.core.cutter import LEAD_FRAMES, LEAD_S, Kept
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.front_end import FrontEnd
-from gestured.core.idle import BASELINE_TAU_S, GLANCE_S, GLANCES, NOISE_TAU_S, REVIEW_S, UNSEEN_S, glances, seen
+from gestured.core.idle import (
+    BASELINE_TAU_S,
+    GLANCE_S,
+    GLANCES,
+    NOISE_TAU_S,
+    QUIETER,
+    REVIEW_S,
+    UNSEEN_S,
+    glances,
+    seen,
+)
 from gestured.core.owner import Source
 from gestured.core.quantiles import median
 from gestured.core.sensor import Sensor
@@ -124,7 +136,7 @@ class Bank:
         self._owners: dict[str, Source] = {}
         self._free = list(range(FIRST_ROWS))
         self._known = np.zeros(FIRST_ROWS, KNOWN)
-        self._taxels = np.zeros((FIRST_ROWS, 5, taxels))
+        self._taxels = [np.zeros((FIRST_ROWS, taxels)) for _ in range(5)]
         self._above = np.zeros((FIRST_ROWS, depth, taxels))  # of the last frames, of which the cutter keeps some
         self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s of each: time, `Kept.new`, interval
 
@@ -138,9 +150,9 @@ class Bank:
         idle, activity = front.conditioner.idle, front.conditioner.activity
         if not self._free:
             self._free = list(range(len(self._known), 2 * len(self._known)))
-            for name in ("_known", "_taxels", "_above", "_when"):
-                table = getattr(self, name)
-                setattr(self, name, np.concatenate([table, np.zeros_like(table)]))
+            for name in ("_known", "_above", "_when"):
+                setattr(self, name, _twice(getattr(self, name)))
+            self._taxels = [_twice(table) for table in self._taxels]
         row = self._free[-1]
         self._known[row] = (
             stamper.last, stamper.arrived, math.nan if stamper.tag is None else stamper.tag,
@@ -152,7 +164,8 @@ class Bank:
         )  # fmt: skip
         assert front.last_sent is not None
         sent, weight = front.last_sent.reshape(-1), front.conditioner.weight
-        self._taxels[row] = idle.counts, idle.sigma, weight, idle.compared, sent
+        for table, values in zip(self._taxels, (idle.counts, idle.sigma, weight, idle.compared, sent), strict=True):
+            table[row] = values
         self._when[row] = -math.inf
         self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
         self._rows[sensor.name] = self._free.pop()
@@ -178,7 +191,7 @@ class Bank:
         vitals.together = together[0], together[1], int(together[2])
         idle.glance, idle.quieter, idle.reviewed, idle.level = glance, int(quieter), reviewed, level
         activity.usual, activity.scale = usual, scale
-        idle.counts, idle.sigma, conditioner.weight, idle.compared, sent = self._taxels[row].copy()
+        idle.counts, idle.sigma, conditioner.weight, idle.compared, sent = [table[row].copy() for table in self._taxels]
         when, above = (  # oldest first
             ring[row, np.arange(int(count), int(count) + ring.shape[1]) % ring.shape[1]]
             for ring in (self._when, self._above)
@@ -200,7 +213,7 @@ class Bank:
         rows = list(self._rows.values())
         known = self._known[["last", "arrived", "interval", "jitter", "level"]][rows].tolist()
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
-            self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
+            self._sensors.values(), self._taxels[COUNTS][rows], known, strict=True
         ):
             sensor.owner.heard = sensor.owner.source_heard = sensor.stamper.arrived = sensor.vitals.last = heard
             sensor.stamper.last = last
@@ -215,8 +228,8 @@ class Bank:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
         if block.values.shape[1:] != self._front.grid_sent:
             return
-        owners = map(self._owners.get, block.sensors)
-        mine = np.array([sources[n] == owner for n, owner in zip(block.packets, owners, strict=True)])
+        owners, sent = map(self._owners.get, block.sensors), map(sources.__getitem__, block.packets)
+        mine = np.fromiter(map(eq, sent, owners), np.bool_, len(block.packets))
         if others:
             mine &= [name not in others for name in block.sensors]
         rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
@@ -225,16 +238,15 @@ class Bank:
             mine &= frames[rows] == 1  # several share their time
         elif block.tags is not None and (several := (mine & (frames[rows] > 1)).nonzero()[0]).size:
             # A sensor whose clock is coarse gives several of its frames one time; it spaces these by itself.
-            of = np.column_stack((rows[several], block.tags[several]))
-            of = of[np.lexsort(of.T)]
-            mine &= ~np.isin(rows, of[1:][(of[1:] == of[:-1]).all(axis=1), 0])
+            order = several[np.lexsort((block.tags[several], rows[several]))]
+            row, tag = rows[order], block.tags[order]
+            if (same := (row[1:] == row[:-1]) & (tag[1:] == tag[:-1])).any():
+                mine &= ~np.isin(rows, row[1:][same])
         left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
-        while len(left) >= FEW:
+        while len(left):
             first.fill(-1)
             first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
             turn = first[first >= 0]
-            if len(turn) < FEW:
-                return
             taken = turn[self._take(block, turn, rows[turn], now)]
             yield taken.tolist()
             left = left[first[rows[left]] != left]
@@ -245,9 +257,9 @@ class Bank:
 
     def _take(self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], now: float) -> Mask:
         """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
-        front, known, taken = self._front, self._known[rows], np.full(len(rows), not self._by_tag)
+        front, known, taken = self._front, _numbers(self._known)[rows], np.full(len(rows), not self._by_tag)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
-         usual, scale, active, new, count, expected, before, pause, came) = map(known.__getitem__, NAMES)  # fmt: skip
+         usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
         t, tags = np.full(len(rows), now), math.nan if block.tags is None else block.tags[places]
         if self._by_tag:
             since = tags - tag
@@ -262,20 +274,25 @@ class Bank:
 
         glanced = (taken & (t >= glance)).nonzero()[0]
         if glanced.size:
-            changes = raw[glanced] - self._taxels[rows[glanced], COMPARED]
-            quieter[glanced] += glances(changes, learned[glanced], lively[glanced], quieter[glanced])
+            changes = raw[glanced] - self._taxels[COMPARED][rows[glanced]]
+            loud = (np.abs(changes) * QUIETER >= learned[glanced, np.newaxis]).sum(axis=1)
+            clear = (loud > changes.shape[1] // 2) & (learned[glanced] > 0)  # so is the median of those that moved
+            quieter[glanced[clear]] = 0.0
             glance[glanced] = t[glanced] + GLANCE_S
-            taken &= quieter < GLANCES  # else the sensor was learned from what was no idle one
-        counts = self._taxels[rows, COUNTS]
+            if not clear.all():
+                changes, less = changes[~clear], glanced[~clear]
+                quieter[less] += glances(changes, learned[less], lively[less], quieter[less])
+                taken &= quieter < GLANCES  # else the sensor was learned from what was no idle one
+        counts = self._taxels[COUNTS][rows]
         above = raw - counts
-        active[:], lowest = self._activity.measure_all(above * self._taxels[rows, WEIGHT])
+        active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT][rows])
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
         ago = np.minimum(-since, 0.0)
         usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago, NOISE_TAU_S)
         counts += above * _shares(ago, BASELINE_TAU_S)[:, np.newaxis]
         due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
         if due.size:
-            sigma = self._taxels[rows[due], SIGMA]
+            sigma = self._taxels[SIGMA][rows[due]]
             unseen = np.maximum(reviewed[due], t[due] - UNSEEN_S) - t[due]
             sigma += (seen(above[due], sigma) - sigma) * _shares(unseen, NOISE_TAU_S)[:, np.newaxis]
             sigma = np.maximum(sigma, step[due, np.newaxis] / 2)
@@ -291,29 +308,39 @@ class Bank:
         moved = before + (np.abs(pause - came * expected) - before) * JITTER_SHARE
         np.copyto(jitter, moved, where=(expected > 0) & (pause < math.inf))
         interval += (since - interval) * SHARE
-        news = (sent.view(np.int64) != self._taxels[rows, SENT].view(np.int64)).any(axis=1) | (lively == 0)
+        news = (sent.view(np.int64) != self._taxels[SENT][rows].view(np.int64)).any(axis=1) | (lively == 0)
         np.copyto(new, t, where=news)
         last[:], arrived[:] = t, now
         # From here on sensors change: all of what was found above, of those whose frames are taken.
         if glanced.size:
             glanced = glanced[taken[glanced]]
-            self._taxels[rows[glanced], COMPARED] = raw[glanced]
+            self._taxels[COMPARED][rows[glanced]] = raw[glanced]
         if due.size:
             fine = taken[due]
             due = rows[due[fine]]
-            self._taxels[due, SIGMA], self._taxels[due, WEIGHT] = sigma[fine], weight[fine]
+            self._taxels[SIGMA][due], self._taxels[WEIGHT][due] = sigma[fine], weight[fine]
         keep = slice(None) if taken.all() else taken
         rows, slot = rows[keep], count[keep].astype(np.intp)
         self._above[rows, slot % self._above.shape[1]] = above[keep]
         self._when[rows, slot % self._when.shape[1]] = np.array((t, new, since)).T[keep]
-        self._taxels[rows, COUNTS], self._taxels[rows, SENT] = counts[keep], sent[keep]
+        self._taxels[COUNTS][rows], self._taxels[SENT][rows] = counts[keep], sent[keep]
         count += 1
-        self._known[rows] = known[keep]
+        _numbers(self._known)[rows] = known[keep]
         return taken
 
     def _mounted(self, values: NDArray[np.generic]) -> Array:
         """(n, R, C) counts as they were sent -> (n, N) as a person in front of the sensor sees them."""
         return self._front.mounting.frame(values).astype(np.float64).reshape(len(values), -1)
+
+
+def _numbers(known: NDArray[Any]) -> Array:
+    """(n,) what is known of n sensors -> (n, len(NAMES)), the same memory, of which rows are copied much faster."""
+    return known.view(np.float64).reshape(len(known), -1)
+
+
+def _twice(table: NDArray[Any]) -> NDArray[Any]:
+    """A table with as many free rows more."""
+    return np.concatenate([table, np.zeros_like(table)])
 
 
 def _shares(ago: Array, tau: float) -> Array:

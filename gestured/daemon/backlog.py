@@ -1,15 +1,16 @@
 """Packets that wait for their turn, and who is served when more comes than can be done."""
 
 import math
-from collections import deque
-from collections.abc import Callable
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
-GROUP_BYTES = 64 << 10  # in one go at the most: 150 frames of 9 x 9 floats
+GROUP, GROUP_BYTES = 256, 64 << 10  # packets, and bytes, in one go at the most: 150 frames of 9 x 9 floats
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
 FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
@@ -18,6 +19,9 @@ CREDIT_S = 0.02  # s of work that a sender may save up and begins with: the pric
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
 NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
 REMEMBERED_SENDERS = 4096  # senders whose costs and credit are remembered in a flood
+
+
+Packet = tuple[bytes, Source]
 
 
 class Datagram(NamedTuple):
@@ -40,7 +44,8 @@ class Backlog:
     def __init__(self, owns: Callable[[Source], bool]) -> None:
         """`owns` says whether a source owns a sensor."""
         self._owns = owns
-        self._waiting: deque[Datagram] = deque()
+        self._packets: list[Packet] = []
+        self._arrivals: list[float] = []  # s, of each
         self._bytes = 0
         # Whether work catches up is measured from time to time: how much was done since, and how far that has led.
         self._work = 0.0  # s of work on groups since the last measurement
@@ -52,19 +57,20 @@ class Backlog:
         self._turns = 0.0  # s of turns since a packet that costs more than a whole turn was last served
 
     def __bool__(self) -> bool:
-        return bool(self._waiting)
+        return bool(self._packets)
 
     @property
     def oldest(self) -> float:
         """When the oldest packet arrived, in s; infinite where none waits."""
-        return self._waiting[0].arrival if self._waiting else math.inf
+        return self._arrivals[0] if self._arrivals else math.inf
 
-    def add(self, datagrams: list[Datagram]) -> None:
-        """Let these wait, in the order of their arrival."""
-        if not self._waiting and datagrams:
-            self._work, self._oldest = 0.0, datagrams[0].arrival
-        self._waiting.extend(datagrams)
-        self._bytes += sum(len(datagram.packet) for datagram in datagrams)
+    def add(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> None:
+        """Let these wait, in the order of their arrival (s)."""
+        if not self._packets and packets:
+            self._work, self._oldest = 0.0, arrivals[0]
+        self._packets += packets
+        self._arrivals += arrivals
+        self._bytes += sum([len(packet) for packet, _ in packets])
 
     def flooded(self, now: float) -> bool:
         """Whether more packets come than can be served; costs and credit are forgotten where that is over."""
@@ -81,22 +87,21 @@ class Backlog:
     def worked(self, seconds: float, now: float) -> None:
         """Note that groups were served for so long (s): where that does not catch up with what comes, it is a flood."""
         self._work += seconds
-        if self._waiting and self._work >= FLOOD_S:
-            oldest = self._waiting[0].arrival
+        if self._packets and self._work >= FLOOD_S:
+            oldest = self.oldest
             if oldest - self._oldest < PACE * self._work and now - oldest >= FLOOD_S:
                 self.flood(now + FLOOD_S)
             self._work, self._oldest = 0.0, oldest
 
-    def group(self) -> list[Datagram]:
-        """Take the oldest packets that arrived together, at most GROUP_BYTES."""
-        first = self._waiting[0].arrival
-        found: list[Datagram] = []
-        size = 0
-        while self._waiting and size < GROUP_BYTES and self._waiting[0].arrival - first < TOGETHER_S:
-            found.append(self._waiting.popleft())
-            size += len(found[-1].packet)
-        self._bytes -= size
-        return found
+    def group(self) -> tuple[list[Packet], float]:
+        """Take the oldest packets that arrived together, at most GROUP_BYTES; also when the last of them came, in s."""
+        n = bisect_left(self._arrivals, self._arrivals[0] + TOGETHER_S, hi=min(GROUP, len(self._arrivals)))
+        ends = list(accumulate([len(packet) for packet, _ in self._packets[:n]]))
+        n = min(n, bisect_left(ends, GROUP_BYTES) + 1)
+        found, arrival = self._packets[:n], self._arrivals[n - 1]
+        del self._packets[:n], self._arrivals[:n]
+        self._bytes -= ends[n - 1]
+        return found, arrival
 
     def share(self, seconds: float, now: float) -> tuple[list[Datagram], dict[Sender, list[bytes]]]:
         """In a flood: what is to be served in a turn of so many seconds, and which packets of whom were dropped.
@@ -105,9 +110,9 @@ class Backlog:
         while it is worked on, the kernel's buffer fills.
         """
         by_sender: dict[Sender, list[Datagram]] = {}
-        for datagram in self._waiting:
-            by_sender.setdefault(self.sender(datagram.source), []).append(datagram)
-        self._waiting.clear()
+        for (packet, source), arrival in zip(self._packets, self._arrivals, strict=True):
+            by_sender.setdefault(self.sender(source), []).append(Datagram(arrival, packet, source))
+        self._packets, self._arrivals = [], []
         self._bytes = 0
         needs: dict[Sender, float] = {key: sum(map(self._guess, waiting)) for key, waiting in by_sender.items()}
         owners: dict[Sender, float] = {key: need for key, need in needs.items() if isinstance(key, tuple)}

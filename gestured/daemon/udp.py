@@ -17,15 +17,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gestured.core.hub import Hub
-from gestured.core.owner import Source
-from gestured.daemon.backlog import FLOOD_S, GROUP_BYTES, TOGETHER_S, Backlog, Datagram
+from gestured.daemon.backlog import FLOOD_S, GROUP, GROUP_BYTES, TOGETHER_S, Backlog, Packet
 from gestured.daemon.desk import Desk
 from gestured.daemon.mute import LONGEST_S, Muted, Sender, mute
 from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
-BATCH = 256  # packets in one read at the most: others have their turn between two reads
 SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
 FLOOD_SLICE_S = 0.001  # of work on waiting packets in a flood, which fills the kernel's buffer while we work
 TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
@@ -39,8 +37,6 @@ STEP_S = 0.05  # by which the wall clock may move against ours; after a larger s
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
 ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
-
-_new = tuple.__new__  # Datagram(...) takes twice the time
 
 
 class Receiver:
@@ -111,20 +107,20 @@ class Receiver:
             self._again.cancel()
             self._again = None
         began = self._clock()
-        found, full = self._receive()
+        found, stamps, full = self._receive()
         now, wall = self._clocks()
         if abs(wall - self._wall) > STEP_S:
-            found = [(packet, b"", source) for packet, _, source in found]
-        much = len(found) > 1 and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
-        late = bool(found) and now - self._arrival(found[0][1], now) >= TOGETHER_S
+            stamps = [b""] * len(found)
+        much = len(found) > 1 and sum([len(packet) for packet, _ in found]) > GROUP_BYTES
+        late = bool(found) and now - self._arrival(stamps[0], now) >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
-            datagrams = self._datagrams(found, now)
-            self._backlog.add(datagrams)
+            arrivals = self._arrivals(stamps, now)
+            self._backlog.add(found, arrivals)
             self._count_drops(now)
-            if found[-1][1]:
-                self._empty = datagrams[-1].arrival  # the kernel gives packets in the order in which they came
+            if stamps[-1]:
+                self._empty = arrivals[-1]  # the kernel gives packets in the order in which they came
         elif found:
-            self._serve([(packet, source) for packet, _, source in found], now)
+            self._serve(found, now)
         if not full:
             self._empty = began  # whatever is found next came later, also where we were stopped since
         self._wall = wall
@@ -143,19 +139,23 @@ class Receiver:
             if now - before < STEP_S:
                 return now, wall - now
 
-    def _receive(self) -> tuple[list[tuple[bytes, bytes, Source]], bool]:
-        """(packets with the kernel's time and their source, whether some may be left in the socket)."""
+    def _receive(self) -> tuple[list[Packet], list[bytes], bool]:
+        """(packets with their sources, the kernel's time of each, whether some may be left in the socket).
+
+        Others have their turn after GROUP packets.
+        """
         receive = self._sock.recvmsg
-        found: list[tuple[bytes, bytes, Source]] = []
+        found, stamps = list[Packet](), list[bytes]()
         try:
-            for _ in range(BATCH):
+            for _ in range(GROUP):
                 packet, ancillary, _, source = receive(PACKET_BYTES, ANCILLARY_BYTES)
-                found.append((packet, ancillary[0][2] if ancillary else b"", source))
+                found.append((packet, source))
+                stamps.append(ancillary[0][2] if ancillary else b"")
         except (BlockingIOError, InterruptedError):
-            return found, False
+            return found, stamps, False
         except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
             self._desk.drop("socket_error", error=str(error))
-        return found, True
+        return found, stamps, True
 
     def _arrival(self, stamp: bytes, now: float) -> float:
         """When a packet came, in s of the monotonic clock: after the socket was empty, and not after `now`."""
@@ -165,16 +165,16 @@ class Receiver:
         came: float = seconds + nanoseconds / 1e9 - self._wall
         return min(now, max(self._empty, came))
 
-    def _datagrams(self, found: list[tuple[bytes, bytes, Source]], now: float) -> list[Datagram]:
-        """The packets that were found with the times of their arrival, which never go back."""
-        stamps = b"".join([stamp for _, stamp, _ in found])
-        if len(stamps) == TIMESTAMP.size * len(found):  # all at once, since each packet has one
-            seconds, nanoseconds = np.frombuffer(stamps, np.int64).reshape(-1, 2).T
+    def _arrivals(self, stamps: list[bytes], now: float) -> list[float]:
+        """When the packets with these times came, as `_arrival` tells of one; they never go back."""
+        joined = b"".join(stamps)
+        if len(joined) == TIMESTAMP.size * len(stamps):  # all at once, since each packet has one
+            seconds, nanoseconds = np.frombuffer(joined, np.int64).reshape(-1, 2).T
             came = np.minimum(now, np.maximum(self._empty, seconds + nanoseconds / 1e9 - self._wall))
         else:
-            came = np.array([self._arrival(stamp, now) for _, stamp, _ in found])
-        arrivals = np.maximum.accumulate(came).tolist()
-        return [_new(Datagram, (at, packet, source)) for at, (packet, _, source) in zip(arrivals, found, strict=True)]
+            came = np.array([self._arrival(stamp, now) for stamp in stamps])
+        arrivals: list[float] = np.maximum.accumulate(came).tolist()
+        return arrivals
 
     def _work(self, now: float) -> None:
         """Serve what waits for as long as a slice lasts."""
@@ -183,8 +183,7 @@ class Receiver:
             return
         end, before = now + SLICE_S, time.thread_time()
         while self._backlog and self._clock() < end:
-            group = self._backlog.group()
-            self._serve([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)
+            self._serve(*self._backlog.group())
         self._backlog.worked(time.thread_time() - before, self._clock())
 
     def _work_fairly(self, now: float) -> None:
@@ -215,7 +214,7 @@ class Receiver:
             except OSError as error:
                 self._desk.drop("socket_error", count=0, error=f"a sender cannot be muted: {error}")
 
-    def _serve(self, packets: Sequence[tuple[bytes, Source]], now: float) -> None:
+    def _serve(self, packets: Sequence[Packet], now: float) -> None:
         if self._taps.active:
             self._taps.packets(packets, now)
         self._desk.take(self._hub.receive(packets, now))

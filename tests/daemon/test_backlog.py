@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.daemon.backlog import CREDIT_S, FLOOD_S, GROUP_BYTES, MOST_BYTES, TOGETHER_S, Backlog, Datagram, fair
+from gestured.daemon.backlog import CREDIT_S, FLOOD_S, GROUP, GROUP_BYTES, MOST_BYTES, TOGETHER_S, Backlog, fair
 
 ARM, SEAT, STRANGER = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.9", 1)
 OWNERS = {ARM, SEAT}
@@ -17,17 +17,18 @@ def backlog() -> Backlog:
 def test_what_arrived_together_is_served_together_in_order() -> None:
     waiting = backlog()
     arrivals = [0.0, TOGETHER_S / 2, TOGETHER_S, 1.0]
-    waiting.add([Datagram(t, b"%d" % n, ARM) for n, t in enumerate(arrivals)])
+    waiting.add([(b"%d" % n, ARM) for n in range(len(arrivals))], arrivals)
     groups = []
     while waiting:
-        groups.append([datagram.packet for datagram in waiting.group()])
+        groups.append([packet for packet, _ in waiting.group()[0]])
     assert groups == [[b"0", b"1"], [b"2"], [b"3"]]
 
 
 def test_a_group_is_bounded() -> None:
     waiting = backlog()
-    waiting.add([Datagram(0.0, bytes(GROUP_BYTES), ARM)] * 3)
-    assert len(waiting.group()) == 1
+    waiting.add([(bytes(GROUP_BYTES), ARM)] * 3 + [(b"", ARM)] * 2 * GROUP, [0.0] * (3 + 2 * GROUP))
+    assert [len(waiting.group()[0]) for _ in range(3)] == [1, 1, 1]
+    assert len(waiting.group()[0]) == GROUP
 
 
 def serve(waiting: Backlog, now: float, count: int, each_s: float) -> float:
@@ -41,7 +42,7 @@ def serve(waiting: Backlog, now: float, count: int, each_s: float) -> float:
 
 def test_a_backlog_that_is_worked_off_is_no_flood_however_long_it_takes() -> None:
     waiting = backlog()
-    waiting.add([Datagram(90.0 + n / 100, FRAME, ARM) for n in range(1000)])
+    waiting.add([(FRAME, ARM)] * 1000, [90.0 + n / 100 for n in range(1000)])
     now = serve(waiting, 100.0, 500, 0.009)
     now += 5.0  # the daemon was stopped again
     assert not waiting.flooded(now)
@@ -51,7 +52,7 @@ def test_a_backlog_that_is_worked_off_is_no_flood_however_long_it_takes() -> Non
 
 def test_what_is_served_slower_than_it_arrives_is_a_flood() -> None:
     waiting = backlog()
-    waiting.add([Datagram(n / 100, FRAME, ARM) for n in range(1000)])
+    waiting.add([(FRAME, ARM)] * 1000, [n / 100 for n in range(1000)])
     now = serve(waiting, 10.0, 49, 0.021)
     assert waiting.flooded(now)
     waiting.share(0.001, now)
@@ -60,16 +61,17 @@ def test_what_is_served_slower_than_it_arrives_is_a_flood() -> None:
 
 def test_a_machine_that_is_a_little_late_is_not_flooded() -> None:
     waiting, now = backlog(), 0.0
-    waiting.add([Datagram(now, FRAME, ARM)] * 3)
+    waiting.add([(FRAME, ARM)] * 3, [now] * 3)
     for _ in range(1000):
         now = serve(waiting, now, 1, 0.01)
-        waiting.add([Datagram(now, FRAME, ARM)])
+        waiting.add([(FRAME, ARM)], [now])
     assert not waiting.flooded(now)
 
 
 def test_what_fills_the_memory_is_a_flood_at_once() -> None:
     waiting = backlog()
-    waiting.add([Datagram(0.0, bytes(60_000), ARM)] * (MOST_BYTES // 60_000 + 1))
+    many = MOST_BYTES // 60_000 + 1
+    waiting.add([(bytes(60_000), ARM)] * many, [0.0] * many)
     assert waiting.flooded(0.0)
 
 
@@ -80,7 +82,8 @@ def flood(
     waiting, served, now = backlog(), dict.fromkeys(senders, 0), 0.0
     for _ in range(turns):
         now += 0.002
-        waiting.add([Datagram(now, FRAME, source) for source, count in senders.items() for _ in range(count)])
+        packets = [(FRAME, source) for source, count in senders.items() for _ in range(count)]
+        waiting.add(packets, [now] * len(packets))
         found, dropped = waiting.share(seconds, now)
         assert len(found) + sum(map(len, dropped.values())) == sum(senders.values()) and not waiting
         for datagram in found:
@@ -108,9 +111,9 @@ def test_who_sends_now_and_then_has_saved_up_for_it_where_many_owners_flood() ->
     waiting, sent, served = Backlog({*crowd, *good}.__contains__), 0, 0
     for turn in range(3000):
         now = 0.006 * turn
-        waiting.add([Datagram(now, bytes(60_000), crowd[turn % len(crowd)])])
+        waiting.add([(bytes(60_000), crowd[turn % len(crowd)])], [now])
         if turn % 10 == 0:
-            waiting.add([Datagram(now, FRAME, source) for source in good])
+            waiting.add([(FRAME, source) for source in good], [now] * len(good))
             sent += len(good)
         for datagram in waiting.share(0.001, now)[0]:
             waiting.took(datagram, 3.75e-7 * len(datagram.packet))
@@ -124,7 +127,7 @@ def test_a_stranger_is_heard_beside_owners_that_flood() -> None:
 
 def test_the_newest_of_what_is_too_much_is_served() -> None:
     waiting = backlog()
-    waiting.add([Datagram(n / 1000, b"%4d" % n * 100, ARM) for n in range(1000)])
+    waiting.add([(b"%4d" % n * 100, ARM) for n in range(1000)], [n / 1000 for n in range(1000)])
     found, _ = waiting.share(0.001, 1.0)
     assert found and [int(datagram.packet[:4]) for datagram in found] == list(range(1000 - len(found), 1000))
 
