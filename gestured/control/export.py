@@ -8,7 +8,7 @@ import numpy as np
 
 from gestured.client.program import Commands
 from gestured.client.say import tell
-from gestured.core.errors import RecordingError
+from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.frames import Frame
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
@@ -35,6 +35,8 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Decode, stamp and write."""
+    if args.out.suffix != ".npz":  # else a slip, as to name the recording twice, puts frames into a tape's place
+        raise GesturedError(f"{args.out}: expected a file *.npz")
     names, made = sessions_of(args.file, args.sensor)
     recording.write(args.out, made)
     summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}

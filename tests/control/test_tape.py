@@ -148,6 +148,9 @@ def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path:
     assert np.diff(found.times) == pytest.approx(1 / 15, abs=1e-3)
     status, _, err = run("export", path, tmp_path / "x.npz", "--sensor", "nobody")
     assert status == 1 and "nobody" in err and not (tmp_path / "x.npz").exists()
+    before = path.read_bytes()
+    assert run("export", path, path) == (1, "", f"gesturectl: {path}: expected a file *.npz\n")
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize(
