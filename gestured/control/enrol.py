@@ -37,14 +37,14 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Enrol it; 1 where it was given up."""
-    with connect(args) as control:
-        control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
-        if not args.json:
-            say(f"perform {args.name} on {args.sensor} {args.examples} times, a second apart; Ctrl-C gives up")
-        try:
+    try:
+        with connect(args) as control:
+            control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
+            if not args.json:
+                say(f"perform {args.name} on {args.sensor} {args.examples} times, a second apart; Ctrl-C gives up")
             return _follow(control, args)
-        except KeyboardInterrupt:
-            return 1
+    except KeyboardInterrupt:
+        return 1
 
 
 def _follow(control: Control, args: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ from gestured.control.cli import main
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.test_own import Performer, ready
+from tests.sockets import FakeDaemon
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +78,15 @@ def test_ctrl_c_gives_up_and_nothing_has_changed(start, ctl, daemon: Daemon, sen
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 1
     assert json.loads(ctl("gestures", "--json")[1])["own"]["gestures"] == {}
+
+
+def test_ctrl_c_before_the_daemon_has_begun_gives_up_too(start, fake: FakeDaemon) -> None:
+    process = start("enrol", "slash", "--sensor", "armrest", "--control", fake.path)
+    waiting, _ = fake.listener.accept()
+    assert b"enrol" in waiting.recv(4096)  # as behind a reload, which may take seconds
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 1
+    waiting.close()
 
 
 @pytest.mark.parametrize("name", ["use", "Slash", "a" * 33])
