@@ -11,7 +11,7 @@ from gestured.client.lines import Unsubscribed
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
-from gestured.client.values import some_of
+from gestured.client.values import number, some_of
 from gestured.control.address import add_sockets, event_path
 from gestured.control.show import said_when
 from gestured.control.status import listens
@@ -36,7 +36,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
     parser.add_argument("--zone", action="append", metavar="NAME", help="only what began in this zone; may be repeated")
-    parser.add_argument("--count", type=int, metavar="N", help="end after N events")
+    parser.add_argument("--count", type=number(1, 10**9, whole=True), metavar="N", help="end after N events")
     parser.add_argument("--reconnect", action="store_true", help="wait for a daemon that is not there (any more)")
     parser.add_argument("--json", action="store_true", help="print the daemon's own lines, the hello among them")
     parser.set_defaults(run=run)

@@ -39,6 +39,7 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: lis
         ("demo", "--seconds", "0"), ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
         ("enrol", "--examples", "many"),
         ("listen", "--types", "gestures"), ("listen", "--types", ""), ("listen", "--count", "one"),
+        ("listen", "--count", "0"),
         ("record x.mcap", "--max-mib", "0"), ("record x.mcap", "--seconds", "-1"),
         ("replay x.npz", "--sensor", "a/b"), ("replay x.npz", "--speed", "0"),
         ("simulate", "--to", "nowhere"), ("simulate", "--to", "127.0.0.1:0"), ("simulate", "--to", "a..b:9000"),
