@@ -134,17 +134,17 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     from gestured.lab import dataset, train
     from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
     from gestured.lab.fit import FitConfig
-    from gestured.lab.own import learn, play
+    from gestured.lab.own import learn
     from gestured.lab.samples import Samples, collect
+    from tests.lab.test_own import drawn
 
     for module in (dataset, train):
-        monkeypatch.setattr(module, "DAY_S", 150.0)
+        monkeypatch.setattr(module, "DAY_S", 90.0)
     monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
-    for plans in ("PERFORMED", "LEARNED", "NON_GESTURES"):
-        monkeypatch.setattr(play, plans, getattr(play, plans)[:6])
-    monkeypatch.setattr(learn, "QUICK_PEOPLE", 2)
-    spread = {"wide": range(60), "cohort": range(0, len(TRIALS), 41), "others": range(0, len(OTHER_TRIALS), 41)}
-    spread |= {"days": range(3), "days_by_chance": range(2), "nominal_days": range(2)}
+    monkeypatch.setattr(learn, "played", lambda *_: drawn())
+    monkeypatch.setattr(learn, "FOLDS", 2)
+    spread = {"wide": range(32), "cohort": range(0, len(TRIALS), 61), "others": range(0, len(OTHER_TRIALS), 61)}
+    spread |= {"days": range(2), "days_by_chance": range(1), "nominal_days": range(2)}
     made: dict[tuple[str, int], Samples] = {}
 
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
@@ -159,7 +159,7 @@ def test_train_makes_three_models_and_evaluate_their_figures(
         return replace(taken, people=subjects), len(taken) - 10
 
     fit = FitConfig(epochs=2, real_epochs=1, real_samples=64)
-    plan = train.TrainingPlan(60, 60, 60, others=80, days=3, days_points=2, forest=200, fit=fit)
+    plan = train.TrainingPlan(32, 32, 32, others=80, days=2, days_points=2, forest=200, fit=fit)
     monkeypatch.setattr(train, "simulated", simulated)
     monkeypatch.setattr(train, "_real", real)
     monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))

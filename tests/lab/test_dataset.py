@@ -13,6 +13,7 @@ from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
+from gestured.lab import dataset
 from gestured.lab.dataset import (
     OTHER_TRIALS,
     STREAMS,
@@ -25,7 +26,7 @@ from gestured.lab.dataset import (
     simulated,
     with_idle,
 )
-from gestured.lab.samples import WINDOW, Samples, collect, join
+from gestured.lab.samples import WINDOW, Sample, Samples, collect, join
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
     GESTURES,
@@ -147,9 +148,16 @@ def test_what_is_simulated_once_is_not_simulated_again(tmp_path: Path, monkeypat
             simulated(tmp_path / "cache", stream, seed, count)
 
 
-def test_a_day_is_the_same_in_another_process(tmp_path: Path) -> None:
+def short_day(seed: int, index: int) -> list[Sample]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dataset, "DAY_S", 90.0)
+        return STREAMS["days"](seed, index)
+
+
+def test_a_day_is_the_same_in_another_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also one on any sensor, which is drawn apart from the day."""
-    same(simulated(tmp_path, "days", 4, 1, jobs=1), collect(STREAMS["days"](4, 0)))
+    monkeypatch.setitem(STREAMS, "short", short_day)
+    same(simulated(tmp_path, "short", 4, 1, jobs=1), collect(short_day(4, 0)))
 
 
 class Broken:

@@ -33,7 +33,7 @@ from gestured.record.replay import Replay, opened
 from tests.small_model import GESTURES, STRICTER, build, operating_points
 
 ROOT = Path(__file__).resolve().parents[2]
-SHORT_S = 400.0
+SHORT_S = 240.0
 
 
 @cache

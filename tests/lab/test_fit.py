@@ -156,8 +156,8 @@ def everyone() -> dict[str, Samples]:
     people = {person: k for k, (person, *_) in enumerate(OTHER_TRIALS)}
     trials = {trial.participant: trial.index for trial in TRIALS}
     patch = pytest.MonkeyPatch()
-    patch.setattr(dataset, "DAY_S", 120.0)
-    made = {f"wide{seed}": collect(s for i in range(25) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
+    patch.setattr(dataset, "DAY_S", 90.0)
+    made = {f"wide{seed}": collect(s for i in range(10) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
     for number, (stream, seed) in enumerate(
         (("days", 1), ("days", 2), ("nominal_days", 3), ("days_by_chance", 1), ("days_by_chance", 2))
     ):
@@ -175,7 +175,7 @@ def data(everyone: dict[str, Samples], tmp_path_factory: pytest.TempPathFactory)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(train, "simulated", simulated)
-        plan = train.TrainingPlan(wide_check=25)
+        plan = train.TrainingPlan(wide_check=10)
         return train.load_data(plan, tmp_path_factory.mktemp("cache"), None, 1)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main
 from gestured.lab.own import learn as own
@@ -18,10 +20,17 @@ from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
-from tests.lab.adapt.recorded import CONSENT, cut_gestures, whole_session
+from tests.documents.blocks import blocks
+from tests.lab.adapt.recorded import CONSENT, cut_gestures, unknown_sensor, whole_session
 from tests.lab.test_own import drawn
 
 Run = Callable[..., tuple[int, str, str]]
+
+
+def small_world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is simulated is made once for all tests, and little."""
+    monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
+    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
 
 
 @pytest.fixture
@@ -32,8 +41,7 @@ def run(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
 ) -> Run:
-    monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
-    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
+    small_world(request, monkeypatch)
     monkeypatch.chdir(tmp_path)
 
     def adapt(*arguments: object) -> tuple[int, str, str]:
@@ -79,18 +87,37 @@ def test_a_model_that_is_written_says_whom_it_learned_from(
     assert "learned from a 07, in mine.npz; weights cannot forget" in out
 
 
-def test_an_adapted_model_still_learns_gestures_of_its_users_own(run: Run, tmp_path: Path) -> None:
-    write(tmp_path / "mine.npz", cut_gestures(("07", "08"), GESTURES))
-    run("mine.npz", "--out", "my.onnx", "--steps", "1", "--force")
-    said_of = open_model(tmp_path / "my.onnx").properties
-    assert json.loads(said_of["classes"])[: len(GESTURES)] == list(GESTURES)
-    assert json.loads(said_of["provisional"])["elapsed_s"][0] == 0
-    model = open_model(tmp_path / "my.onnx")
+@pytest.mark.slow
+def test_the_document_leads_to_a_model(
+    tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What docs/own-sensor.md does with recordings runs, in its order; the model still learns gestures of one's own."""
+    small_world(request, monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    Path("recordings").mkdir()
+    for k, name in enumerate(("07", "08")):
+        made = cut_gestures((name,), GESTURES, repeats=2, sensor=unknown_sensor(k))
+        assert made.frames.shape[1:] == (12, 10) and np.ptp(made.frames) > 0
+        write(f"recordings/{name}.npz", made)
+    ran = []
+    words = f"tests/lab/adapt/test_command.py::{request.node.name}"
+    for line in "".join(block.text for block in blocks("run", words)).splitlines():
+        program, *arguments = shlex.split(line)
+        if arguments[0] == "adapt":
+            arguments += ["--steps", "2", "--force"]  # whether it is better is another test's
+        status = (gesturectl if program == "gesturectl" else main)(arguments)
+        said = capsys.readouterr()
+        assert status == 0 or (arguments[0] == "adapt" and "written: " in said.out), said.err
+        ran.append(arguments[0])
+    assert ran == ["tune", "adapt", "check"]
+    model = open_model(Path("my.onnx"))
+    assert json.loads(model.properties["classes"])[: len(GESTURES)] == list(GESTURES)
+    assert json.loads(model.properties["provisional"])["elapsed_s"][0] == 0
     assert model.space is not None
     seen = Seen.by(model, drawn())
     plan, _ = seen.plans()
     np.testing.assert_allclose(model.space.mean, seen.embedding[plan].mean(axis=0), atol=1e-4)  # of the new weights
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "my.onnx"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my.onnx", "recordings"]
 
 
 @pytest.mark.hostile

@@ -25,6 +25,7 @@ def test_harmless_cases_lose_no_more_than_a_gesture_or_two(monkeypatch: pytest.M
     # And one of which everybody must see that it harms, or the table would say nothing.
     chosen.append(Case("blind", lambda take, _: replace(take, frames=np.zeros(take.frames.shape))))
     monkeypatch.setattr("gestured.lab.stability.stiff.cases", lambda: chosen)
+    monkeypatch.setattr("gestured.lab.stability.stiff.SESSION_S", 60.0)
     table = stiff_table(open_model(LADDER[0]), quick=True)
     (_, _, meant, right, *_), *bent, blind, day = table.rows
     assert isinstance(right, int) and isinstance(meant, int) and right >= 0.9 * meant
