@@ -9,6 +9,7 @@ import asyncio
 import json
 import socket
 import threading
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from http import HTTPStatus
@@ -22,6 +23,7 @@ from gestured.daemon.status import healthy, status
 DEADLINE_S = 5.0  # for a connection, from its start to its answer
 REQUEST_BYTES = 8192  # of a request's head, at most
 HTTP_CONNECTIONS = 64  # at a time
+REST = 4  # seconds that we let pass for each one that was worked for those who ask
 
 Response = tuple[int, str, bytes]  # status, content type, body
 
@@ -82,7 +84,12 @@ class HttpThread:
         self._sock.close()
 
     async def _accept(self) -> None:
-        """Take connections. asyncio's own server tries again a hundred times at once where it has no descriptor."""
+        """Take connections. asyncio's own server tries again a hundred times at once where it has no descriptor.
+
+        After each one there is a pause in which the loop's thread has the interpreter, so that whoever asks without
+        end makes no answer about a gesture late.
+        """
+        spent = time.thread_time()
         while True:
             try:
                 sock, _ = await self._loop.sock_accept(self._sock)
@@ -93,6 +100,9 @@ class HttpThread:
             except OSError as error:
                 self._throttle.warn("cannot accept a connection to metrics", reason_of(error))
                 await asyncio.sleep(AGAIN_S)
+            else:
+                before, spent = spent, time.thread_time()
+                await asyncio.sleep(REST * (spent - before))
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._open) >= HTTP_CONNECTIONS:

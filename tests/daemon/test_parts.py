@@ -317,8 +317,32 @@ def test_where_no_descriptor_is_left_http_tries_now_and_then(monkeypatch: pytest
     monkeypatch.setattr(asyncio, "sleep", sleep)
     thread = HttpThread(sock, {"/ok": lambda: as_json(200, {"fine": True})})
     assert ask(sock.getsockname(), b"GET /ok HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 200")
-    assert pauses == [AGAIN_S] * 3 == [AGAIN_S] * sock.refused
+    assert pauses[:3] == [AGAIN_S] * 3 == [AGAIN_S] * sock.refused
     thread.close()
+
+
+def test_who_asks_without_end_leaves_the_interpreter_to_the_daemon_most_of_the_time(monkeypatch) -> None:
+    pauses: list[float] = []
+    worked: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        pauses.append(seconds)
+
+    def page() -> http.Response:
+        began = time.thread_time()
+        while time.thread_time() < began + 0.005:
+            pass
+        worked.append(time.thread_time() - began)
+        return as_json(200, {})
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    with socket.create_server(("127.0.0.1", 0)) as sock:
+        sock.setblocking(False)
+        thread = HttpThread(sock, {"/page": page})
+        for _ in range(5):
+            ask(sock.getsockname(), b"GET /page HTTP/1.1\r\n\r\n")
+        thread.close()
+    assert sum(pauses) >= http.REST * sum(worked[:-1])  # the pause for the last one comes after the next
 
 
 def test_http_that_cannot_start_says_so_instead_of_waiting(monkeypatch) -> None:
