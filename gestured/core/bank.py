@@ -111,11 +111,11 @@ class Banks:
             others = others.union(names.intersection(block.sensors))
             names.update(block.sensors)
         for block in blocks:
-            waits = np.full(len(block.packets), True)
+            waits = np.ones(len(block.packets), np.bool_)
             for bank in self._banks.values():
                 try:
                     for taken in bank.take(block, sources, others, now):
-                        facts.append(Arrived(tuple([block.sensors[n] for n in taken]), 1, 0, 0, 0, 0))
+                        facts.append(Arrived(tuple(map(block.sensors.__getitem__, taken)), 1, 0, 0, 0, 0))
                         waits[taken] = False
                 except Exception as error:  # a bug: what was not taken until then is taken one by one
                     facts.append(Fault(None, error))
@@ -257,10 +257,11 @@ class Bank:
 
     def _take(self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], now: float) -> Mask:
         """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
-        front, known, taken = self._front, _numbers(self._known)[rows], np.full(len(rows), not self._by_tag)
+        front, known = self._front, _numbers(self._known).take(rows, axis=0)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
          usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
-        t, tags = np.full(len(rows), now), math.nan if block.tags is None else block.tags[places]
+        tags, taken = math.nan if block.tags is None else block.tags[places], np.ones(len(rows), np.bool_)
+        t = np.zeros(len(rows)) + now
         if self._by_tag:
             since = tags - tag
             t = last + since
@@ -283,18 +284,19 @@ class Bank:
                 changes, less = changes[~clear], glanced[~clear]
                 quieter[less] += glances(changes, learned[less], lively[less], quieter[less])
                 taken &= quieter < GLANCES  # else the sensor was learned from what was no idle one
-        counts = self._taxels[COUNTS][rows]
+        counts = self._taxels[COUNTS].take(rows, axis=0)
         above = raw - counts
-        active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT][rows])
+        active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
         ago = np.minimum(-since, 0.0)
-        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago, NOISE_TAU_S)
-        counts += above * _shares(ago, BASELINE_TAU_S)[:, np.newaxis]
+        followed, noted = _shares(np.concatenate((ago / BASELINE_TAU_S, ago / NOISE_TAU_S))).reshape(2, -1)
+        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * noted
+        counts += above * followed[:, np.newaxis]
         due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
         if due.size:
             sigma = self._taxels[SIGMA][rows[due]]
             unseen = np.maximum(reviewed[due], t[due] - UNSEEN_S) - t[due]
-            sigma += (seen(above[due], sigma) - sigma) * _shares(unseen, NOISE_TAU_S)[:, np.newaxis]
+            sigma += (seen(above[due], sigma) - sigma) * _shares(unseen / NOISE_TAU_S)[:, np.newaxis]
             sigma = np.maximum(sigma, step[due, np.newaxis] / 2)
             level[due], reviewed[due] = median(sigma.T), t[due]
             scale[due] = np.minimum(np.maximum(usual[due] / self._activity.typical, 1.0), USUAL_AT_MOST)
@@ -308,7 +310,7 @@ class Bank:
         moved = before + (np.abs(pause - came * expected) - before) * JITTER_SHARE
         np.copyto(jitter, moved, where=(expected > 0) & (pause < math.inf))
         interval += (since - interval) * SHARE
-        news = (sent.view(np.int64) != self._taxels[SENT][rows].view(np.int64)).any(axis=1) | (lively == 0)
+        news = (_bytes(sent) != _bytes(self._taxels[SENT].take(rows, axis=0))) | (lively == 0)
         np.copyto(new, t, where=news)
         last[:], arrived[:] = t, now
         # From here on sensors change: all of what was found above, of those whose frames are taken.
@@ -343,6 +345,13 @@ def _twice(table: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([table, np.zeros_like(table)])
 
 
-def _shares(ago: Array, tau: float) -> Array:
-    """(n,) shares of a difference that a follower with time constant `tau` s takes up in (n,) times `-ago` s."""
-    return -np.array(list(map(math.expm1, (ago / tau).tolist())))
+def _bytes(rows: Array) -> NDArray[np.void]:
+    """(n, N) -> (n,), each row as its bytes, which are compared at once."""
+    return rows.view(f"V{rows.itemsize * rows.shape[1]}")[:, 0]
+
+
+def _shares(ago: Array) -> Array:
+    """(n,) shares of a difference that a follower takes up in (n,) times `-ago`, in units of its time constant."""
+    times = ago.tolist()
+    shares = {time: -math.expm1(time) for time in set(times)}  # sensors that are read together share their times
+    return np.array([shares[time] for time in times])

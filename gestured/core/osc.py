@@ -9,7 +9,7 @@ known, a string that is not UTF-8), `truncated` (fewer bytes than the type tags 
 `bundle` (sizes that do not fit, nested too deep), `oversized` (packet, type tags or number of messages).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -132,6 +132,12 @@ class Layouts:
             if not data.startswith(slot[1], slot[0]):
                 return None
         return layout
+
+    def guess(self, packets: Iterable[bytes]) -> list[Layout | None]:
+        """The layout of each packet, or that of another one: whoever asks has to compare lengths and heads."""
+        known = self._known.get
+        begins = [data[BUNDLED if data.startswith(_BUNDLE) else ALONE] for data in packets]
+        return [known(begin) or known(_key(begin)) for begin in begins]
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""

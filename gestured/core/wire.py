@@ -122,7 +122,9 @@ class _Meaning(NamedTuple):
     route: _Route
     slot: Slot  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
-    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
+    form: int  # the same for packets whose heads and frames stand in the same places, of the same type and grid
+    heads: bytes  # of all its messages
+    places: tuple[slice, ...]  # in a packet, of each of them
 
 
 class Decoder:
@@ -176,8 +178,8 @@ class Decoder:
         `decode`: it is laid out in another way than its neighbours, or its frame is not finite.
         """
         alike: dict[int, list[tuple[int, _Meaning]]] = {}
-        for i, layout in enumerate(map(self._layouts.find, packets)):
-            if layout is not None:
+        for i, layout in enumerate(self._layouts.guess(packets)):
+            if layout is not None and layout.length == len(packets[i]):
                 meaning: _Meaning | Literal[False] = layout.meaning
                 if meaning is None:
                     meaning = layout.meaning = self._meaning(layout)
@@ -202,11 +204,13 @@ class Decoder:
         dtype = slot.dtype if slot.dtype is not None else _BLOBS.get(slot.length / (rows * columns))
         if dtype is None or any(other.blob for other in layout.slots if other is not slot):
             return False
-        bundled = slot.start > 0  # a short name in a bundle's packet is as long as a long one by itself
-        form = layout.length, bundled, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
+        heads = tuple((other.start, len(other.head)) for other in layout.slots)
+        form = layout.length, heads, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        return _Meaning(route, slot, dtype, self._forms.setdefault(form, next(self._numbers)))
+        number = self._forms.setdefault(form, next(self._numbers))
+        places = tuple(slice(start, start + length) for start, length in heads)
+        return _Meaning(route, slot, dtype, number, b"".join([other.head for other in layout.slots]), places)
 
     def _find_route(self, address: str, types: str) -> _Route:
         matched = self._addresses.match(address)
@@ -289,27 +293,31 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 
 def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
-    """The finite frames of packets whose `form` is the same."""
-    _, (route, slot, dtype, _) = members[0]
+    """The finite frames of packets whose `form` may be the same, of those that have the heads which it says."""
+    found, meanings = zip(*members, strict=True)
+    route, slot, dtype, _, _, places = meanings[0]
     assert route.grid is not None
     taxels, end = math.prod(route.grid), slot.run + (slot.length if slot.blob else slot.length * dtype.itemsize)
-    block = np.frombuffer(b"".join([packets[i] for i, _ in members]), np.uint8).reshape(len(members), -1)
+    block, heads = (
+        np.frombuffer(b"".join(some), np.uint8).reshape(len(members), -1)
+        for some in ([packets[i] for i in found], [meaning.heads for meaning in meanings])
+    )
     raw = block[:, slot.run : end].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
-    good = np.isfinite(values).all(axis=1)
+    good = [np.isfinite(values), heads == np.concatenate([block[:, place] for place in places], axis=1)]
     counters = tags = None
     if slot.blob:
-        good &= block[:, slot.run - 4 : slot.run].view(">u4")[:, 0] == slot.length
+        good.append(block[:, slot.run - 4 : slot.run].view(">u4") == slot.length)
     if route.counted:
         first = raw if slot.unpack is None else block[:, slot.scalars : slot.scalars + 4].view(">i4")
         counters = first[:, 0].astype(np.int64)
     if slot.start:  # alone, a message begins at 0
         tags = osc.timetags(block[:, 8:16])
-    found = Block(
-        [i for i, _ in members], [meaning.route.sensor for _, meaning in members],
-        values.reshape(-1, *route.grid), counters, tags,
-    )  # fmt: skip
-    return found if good.all() else found.only(good.nonzero()[0])
+    sensors = [meaning.route.sensor for meaning in meanings]
+    read = Block(list(found), sensors, values.reshape(-1, *route.grid), counters, tags)
+    if all(each.all() for each in good):  # much faster than row by row
+        return read
+    return read.only(np.logical_and.reduce([each.all(axis=1) for each in good]).nonzero()[0])
 
 
 def _joined(blocks: list[Block]) -> Block:

@@ -1,7 +1,7 @@
 """Packets that wait for their turn, and who is served when more comes than can be done."""
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from itertools import accumulate
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
-GROUP, GROUP_BYTES = 256, 64 << 10  # packets, and bytes, in one go at the most: 150 frames of 9 x 9 floats
+GROUP, GROUP_BYTES = 256, 128 << 10  # packets, and bytes of several packets, in one go at the most
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
 FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
@@ -94,10 +94,10 @@ class Backlog:
             self._work, self._oldest = 0.0, oldest
 
     def group(self) -> tuple[list[Packet], float]:
-        """Take the oldest packets that arrived together, at most GROUP_BYTES; also when the last of them came, in s."""
+        """Take the oldest packets that arrived together, at least one; also when the last of them came, in s."""
         n = bisect_left(self._arrivals, self._arrivals[0] + TOGETHER_S, hi=min(GROUP, len(self._arrivals)))
         ends = list(accumulate([len(packet) for packet, _ in self._packets[:n]]))
-        n = min(n, bisect_left(ends, GROUP_BYTES) + 1)
+        n = max(1, bisect_right(ends, GROUP_BYTES))
         found, arrival = self._packets[:n], self._arrivals[n - 1]
         del self._packets[:n], self._arrivals[:n]
         self._bytes -= ends[n - 1]

@@ -26,9 +26,9 @@ def test_what_arrived_together_is_served_together_in_order() -> None:
 
 def test_a_group_is_bounded() -> None:
     waiting = backlog()
-    waiting.add([(bytes(GROUP_BYTES), ARM)] * 3 + [(b"", ARM)] * 2 * GROUP, [0.0] * (3 + 2 * GROUP))
-    assert [len(waiting.group()[0]) for _ in range(3)] == [1, 1, 1]
-    assert len(waiting.group()[0]) == GROUP
+    sizes = [GROUP_BYTES + 1, GROUP_BYTES - 1, 1, 1, *[0] * 2 * GROUP]
+    waiting.add([(bytes(size), ARM) for size in sizes], [0.0] * len(sizes))
+    assert [len(waiting.group()[0]) for _ in range(4)] == [1, 2, GROUP, GROUP]
 
 
 def serve(waiting: Backlog, now: float, count: int, each_s: float) -> float:
