@@ -222,6 +222,8 @@ class Service:
         if parts.gestures != before:
             parts.clients.tell(messages.gestures_json(parts.gestures))
         for output in outputs:
+            for one in asked.outputs:
+                one.take_over(output)
             output.close()
         parts.desk.sinks = self._sinks()
         self._foresee()

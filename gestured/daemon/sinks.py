@@ -45,6 +45,9 @@ class UdpOut(Sink):
         except OSError as error:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
+    def take_over(self, before: "UdpOut") -> None:
+        """Go on where one ends that a reload replaces, if it has the same destination."""
+
     def close(self) -> None:
         """Close the socket; nothing is sent after it."""
         if self._socket is not None:
@@ -113,11 +116,24 @@ class OscSink(UdpOut):
             heard = sum(state not in SILENT for state in event.sensors.values())
             self.send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
 
+    def take_over(self, before: UdpOut) -> None:
+        """Revoke what the one before has said, where that turns out wrong."""
+        if isinstance(before, OscSink) and before.destination == self.destination and self.wants:
+            self._said, before._said = before._said, {}
+
+    def close(self) -> None:
+        """Take back what was said of contacts that nobody hears the end of, then close the socket."""
+        for said in self._said.values():
+            self._revoke(said)
+        super().close()
+
+    def _revoke(self, said: Provisional) -> None:
+        self.send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", (said.gesture, said.id)).dgram)
+
     def _judge(self, answer: Gesture | Unknown | Cancelled) -> None:
         """Take back what was sent of a contact that turns out to be something else."""
         said = self._said.get(answer.sensor)
         if said is not None and said.id == answer.id:
             del self._said[answer.sensor]
             if answer.provisional == "revoked":
-                args = (said.gesture, said.id)
-                self.send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", args).dgram)
+                self._revoke(said)

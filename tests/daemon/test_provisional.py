@@ -177,6 +177,27 @@ def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket)
     assert [found[n][2][-1] for n in (0, 2, 3)] == [1, 2, 2] and 0.9 <= found[0][2][1] <= 1
 
 
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_what_was_said_over_osc_is_revoked_across_a_reload(start, early: Path, udp: socket.socket, goes_on) -> None:
+    config = early.with_suffix(".toml")
+    config.write_text("publish_provisional = true")
+    to = f"osc://127.0.0.1:{udp.getsockname()[1]}"
+    daemon = start("--clock", "sensor", "--stale-s", 30, "--publish", to, "--config", config, model=early)
+
+    def heard() -> tuple[str, list[Any]]:
+        while (message := OscMessage(udp.recv(9999))).address in ("/gestured/status", "/gestured/arm/where"):
+            pass
+        return message.address.removeprefix("/gestured/arm/"), message.params[:1]
+
+    sensor = Sensor(daemon, "arm").begin()
+    sensor.send(sensor.hand.tap(), sensor.hand.idle(0.2))
+    assert heard() == ("provisional", ["one_tap"])
+    config.write_text(f"publish_provisional = {str(goes_on).lower()}")
+    daemon.ask("reload")
+    sensor.send(sensor.hand.tap(), sensor.hand.idle(1.0))
+    assert [heard() for _ in range(2)] == [("revoked", ["one_tap"]), ("gesture", ["double_tap"])]
+
+
 def test_without_the_setting_osc_says_only_what_it_said_before(udp: socket.socket) -> None:
     for wanted, first in ((False, "gesture"), (True, "provisional")):
         sink = OscSink(Address(*udp.getsockname()), Metrics(), provisional=wanted)
