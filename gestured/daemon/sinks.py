@@ -1,14 +1,20 @@
 """Where events go. A sink takes every event and never blocks; what it cannot deliver it counts."""
 
+import math
+import signal
 import socket
+import threading
+import time
 from typing import Protocol
 
 from gestured.core.address import Address
 from gestured.core.beside.reading import SILENT
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
-from gestured.daemon.log import Throttle, log
+from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.sockets import resolve
+from gestured.daemon.sockets import reason_of, resolve
+
+LOOK_UP_S = 5.0  # from one look-up of a destination that was not found to the next
 
 
 class Sink(Protocol):
@@ -39,11 +45,21 @@ class UdpOut(Sink):
         self._metrics, self._throttle = metrics, Throttle()
         self._socket: socket.socket | None = None
         self._connected = False
+        self._look_up()
+
+    def _look_up(self) -> None:
+        """Find the destination, which may block for seconds; any thread may."""
         try:
-            family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
+            family, self._where = resolve(self.destination, socket.SOCK_DGRAM)
             self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         except OSError as error:
-            log.error("publish: no such destination", destination=str(destination), error=error.strerror)
+            reason = error.strerror or reason_of(error)
+            self._throttle.warn("publish: no such destination", reason, destination=str(self.destination))
+        self._due = time.monotonic() + LOOK_UP_S
+
+    def _look_again(self) -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
+        self._look_up()
 
     def take_over(self, before: "UdpOut") -> None:
         """Go on where one ends that a reload replaces, if it has the same destination."""
@@ -57,6 +73,9 @@ class UdpOut(Sink):
         """Send a packet, or count that it could not be sent."""
         if self._socket is None:
             self._failed("unresolved")
+            if time.monotonic() >= self._due:  # the network, or who knows names in it, comes later than we do
+                self._due = math.inf
+                threading.Thread(target=self._look_again, name="publish", daemon=True).start()
             return
         for _ in range(2):
             try:
