@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gestured.core.activity import SURPRISE, USUAL_AT_MOST, Activity
 from gestured.core.beside.reading import WEIGHT as JITTER_SHARE
 from gestured.core.conditioning import Look, weigh
+from gestured.core.contact import AfterEffect
 from gestured.core.cutter import LEAD_FRAMES, LEAD_S, Kept
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.front_end import FrontEnd
@@ -27,6 +28,7 @@ from gestured.core.idle import (
     GLANCES,
     NOISE_TAU_S,
     QUIETER,
+    RECOVERY_TAU_S,
     REVIEW_S,
     UNSEEN_S,
     glances,
@@ -34,6 +36,7 @@ from gestured.core.idle import (
 )
 from gestured.core.owner import Source
 from gestured.core.quantiles import median
+from gestured.core.segmenter import IDLE
 from gestured.core.sensor import Sensor
 from gestured.core.stamping import Stamper
 from gestured.core.taxels import NOISY
@@ -66,9 +69,10 @@ class Banks:
 
     def enter(self, sensor: Sensor) -> None:
         """Move what is known of a sensor into a bank, if it is calm and its last frame came in its turn."""
+        front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
+        front.calm = _calm(front)  # until its next frame
         if not sensor.calm:
             return
-        front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
         arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.source_heard}
         if stamper.by_tag and stamper.tag is None:
@@ -134,6 +138,7 @@ class Bank:
         self._sensors: dict[str, Sensor] = {}
         self._rows: dict[str, int] = {}
         self._owners: dict[str, Source] = {}
+        self._recover: dict[int, AfterEffect] = {}  # by row: what a contact has left on a sensor
         self._free = list(range(FIRST_ROWS))
         self._known = np.zeros(FIRST_ROWS, KNOWN)
         self._taxels = [np.zeros((FIRST_ROWS, taxels)) for _ in range(5)]
@@ -168,12 +173,15 @@ class Bank:
             table[row] = values
         self._when[row] = -math.inf
         self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
+        if front.segmenter.after.recovering(self._known["last"][row]):
+            self._recover[row] = front.segmenter.after
         self._rows[sensor.name] = self._free.pop()
 
     def leave(self, name: str) -> None:
         """Move what is known of a sensor back into its objects."""
         row, sensor = self._rows.pop(name), self._sensors.pop(name)
         del self._owners[name]
+        self._recover.pop(row, None)
         self._free.append(row)
         (last, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
          usual, scale, active, new, count, _, *together) = self._known[row].item()  # fmt: skip
@@ -288,8 +296,8 @@ class Bank:
         above = raw - counts
         active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
-        ago = np.minimum(-since, 0.0)
-        followed, noted = _shares(np.concatenate((ago / BASELINE_TAU_S, ago / NOISE_TAU_S))).reshape(2, -1)
+        ago, tau = np.minimum(-since, 0.0), self._taus(rows, t)
+        followed, noted = _shares(np.concatenate((ago / tau, ago / NOISE_TAU_S))).reshape(2, -1)
         usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * noted
         counts += above * followed[:, np.newaxis]
         due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
@@ -330,9 +338,29 @@ class Bank:
         _numbers(self._known)[rows] = known[keep]
         return taken
 
+    def _taus(self, rows: NDArray[np.intp], t: Array) -> float | Array:
+        """With which time constants the baselines follow until (n,) times `t`, in s; one number where all have it."""
+        if not self._recover:
+            return BASELINE_TAU_S
+        taus = np.zeros(len(rows)) + BASELINE_TAU_S
+        for n, row in enumerate(rows.tolist()):
+            if (after := self._recover.get(row)) is not None:
+                if after.recovering(t[n]):
+                    taus[n] = RECOVERY_TAU_S
+                else:
+                    del self._recover[row]
+        return taus
+
     def _mounted(self, values: NDArray[np.generic]) -> Array:
         """(n, R, C) counts as they were sent -> (n, N) as a person in front of the sensor sees them."""
         return self._front.mounting.frame(values).astype(np.float64).reshape(len(values), -1)
+
+
+def _calm(front: FrontEnd) -> bool:
+    """Whether a bank can take a front end's next frame: it is calm, or would be but for a contact's after-effect."""
+    look = front.look
+    known = look is not None and not look.sunken and front.conditioner.sound and front.pace.interval_s > 0
+    return front.calm or (known and front.segmenter.phase is IDLE)
 
 
 def _numbers(known: NDArray[Any]) -> Array:
