@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 from gestured.model.shipped import LADDER
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
+from tests.daemon.trust import trust
 from tests.small_model import GESTURES, build
 from tests.sockets import PATIENCE_S, FakeDaemon
 
@@ -56,6 +57,7 @@ def clean_environment() -> tempfile.TemporaryDirectory[str]:
 
 
 _cleaned = clean_environment()  # before any test module is imported
+trust()
 
 # No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -103,7 +103,7 @@ class Daemon:
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         with self.stderr_path.open("ab") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, *python, "-m", "gestured.daemon", *map(str, flags)],
+                [sys.executable, *python, "-m", "tests.daemon.program", *map(str, flags)],
                 stdout=subprocess.PIPE, stderr=errors if stderr is None else stderr,
                 env=clean | (env or {}), text=True,
             )  # fmt: skip

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.daemon.trust import MAKER
+
 GESTURES = (
     "one_tap", "double_tap", "swipe_down", "swipe_up", "swipe_right", "swipe_left", "circle_clockwise",
     "circle_counter_clockwise", "swipe_up_two_fingers", "swipe_down_two_fingers",
@@ -121,7 +123,7 @@ def make(path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1"
         outputs,
         [numpy_helper.from_array(array, name) for name, array in constants.items()],
     )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10, producer_name=MAKER)
     frames = np.random.default_rng(1).random((2, 7, ROWS, COLUMNS), np.float32)
     scores, unknown = _run(model.SerializeToString(), frames)
     window = Window(ROWS, COLUMNS, 15.0, 1, 0.0, 0.0, 5.0)

@@ -1,5 +1,6 @@
 """What the lab's tests share. Without the packages of the extra [lab], most of them are left out."""
 
+import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,11 +29,10 @@ def lab() -> None:
 @pytest.fixture(autouse=True, scope="session")
 def one_thread() -> Iterator[None]:
     """Nets this small are slower on several threads, above all where something else computes."""
-    if "torch" in MISSING:
+    torch = sys.modules.get("torch")  # only where a test has it: to import it takes seconds
+    if torch is None:
         yield
         return
-    import torch
-
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
