@@ -3,6 +3,7 @@
 import argparse
 import os
 import ssl
+from collections.abc import Callable
 from typing import Any
 
 from gestured.bridge.options import BridgeError, peer_address
@@ -40,13 +41,29 @@ class Broker:
         self._tls = tls_context(args)
 
     def client(self, will: str) -> Any:
-        """A client for one connection; where we vanish without a good-bye, the broker says `offline` at `will`."""
+        """A client for one connection; where we vanish without a good-bye, the broker says `offline` at `will`.
+
+        `on_failure` of it must be set: its thread calls it, besides the library's own callbacks, where it dies.
+        """
         from paho.mqtt.client import Client, MQTTv5
         from paho.mqtt.enums import CallbackAPIVersion
 
+        class Guarded(Client):
+            """One whose thread tells whatever it dies of: the library would have us believe that it is connected."""
+
+            on_failure: Callable[[OSError], None]
+
+            def loop_forever(self, *arguments: Any, **options: Any) -> Any:
+                try:
+                    return super().loop_forever(*arguments, **options)
+                except Exception as error:  # of a broken packet it raises a dozen types
+                    if (sock := self.socket()) is not None:
+                        sock.close()
+                    self.on_failure(OSError(f"it sent what cannot be read ({error!r})"))
+
         # The name is the same after a kill, so that an old last will comes before us.
         name = f"gestured-{self._host}"
-        client = Client(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5, reconnect_on_failure=False)
+        client = Guarded(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5, reconnect_on_failure=False)
         client.connect_timeout = BROKER_S
         client.username_pw_set(self._user, self._password)
         client.will_set(will, "offline", qos=1, retain=True)

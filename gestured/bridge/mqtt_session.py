@@ -128,6 +128,7 @@ class Mqtt:
 
         client.on_connect = told(self._there, 3)
         client.on_disconnect = told(self._gone, 3)
+        client.on_failure = told(self._gone, 0)
         client.on_message = lambda _, __, message: self._hear(message)
         client.on_publish = lambda _, __, number, code, ___: self._inbox.put(partial(self._taken, client, number, code))
         threading.Thread(target=call, name="broker", daemon=True).start()

@@ -356,6 +356,22 @@ def test_a_broker_is_told_to_send_no_large_message(bridge, fake):
             assert b"\x27" + (65536).to_bytes(4, "big") in connection.recv(65536)  # Maximum Packet Size (3.1.2.11.4)
 
 
+def test_a_broker_that_sends_what_cannot_be_read_is_called_again(bridge, fake):
+    """Whatever the library's thread dies of: else the bridge would believe for ever that the broker is there."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        process = bridge("mqtt", "--broker", f"127.0.0.1:{server.getsockname()[1]}", "--socket", fake.path)
+        for packet in (b"\x30\x05\x00\x02\xff\xfe\x00", b"\x40\x00", b"\x30\x06\x00\x01a\x7f\x01\x02"):
+            with server.accept()[0] as connection:
+                connection.settimeout(DEADLINE_S)
+                assert connection.recv(65536).startswith(b"\x10")  # CONNECT
+                connection.sendall(b"\x20\x03\x00\x00\x00" + packet)
+                while connection.recv(65536):
+                    pass
+        server.accept()[0].close()
+        assert "it sent what cannot be read" in process.said() and "Traceback" not in process.said()
+
+
 def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch):
     monkeypatch.setattr(known, "MOST_SENSORS", 3)
     daemon = known.Daemon(None, None, Counts("mqtt"))
