@@ -47,12 +47,12 @@ class Bound:
     close: Callable[[], None]  # closes all sockets, and removes the paths that we made for them
 
     def addresses(self) -> dict[str, str | None]:
-        """Where the daemon can be reached."""
+        """Where the daemon can be reached, from whatever folder."""
         return {
             "listen": name_of(self.udp),
-            "socket": str(self.events.path),
-            "control": str(self.control.path),
-            "gates": str(self.gates.path) if self.gates else None,
+            "socket": str(self.events.path.absolute()),
+            "control": str(self.control.path.absolute()),
+            "gates": str(self.gates.path.absolute()) if self.gates else None,
             "metrics": name_of(self.http) if self.http else None,
         }
 

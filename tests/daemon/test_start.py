@@ -45,6 +45,13 @@ def test_the_ready_line_says_where_everything_is(start) -> None:
     assert json.loads(daemon.get("/readyz")[1])["ready"] is True
 
 
+def test_a_socket_below_the_daemons_folder_is_found_from_any_other(start, tmp_path: Path) -> None:
+    daemon = start("--socket", os.path.relpath(tmp_path / "events.sock"))
+    told = daemon.ask("status")["addresses"]
+    for name, path in (("socket", tmp_path / "events.sock"), ("control", tmp_path / "events.ctl")):
+        assert daemon.ready[name] == told[name] and Path(told[name]).is_absolute() and path.samefile(told[name])
+
+
 def test_it_listens_on_ipv6_too(start) -> None:
     try:
         socket.socket(socket.AF_INET6, socket.SOCK_DGRAM).bind(("::1", 0))
