@@ -55,7 +55,8 @@ async def _run(settings: Settings, load: Loader) -> None:
         lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
     )
     _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
-    _end_surely(loop)
+    served = threading.Event()
+    _end_surely(loop, served)
     bound = bind_all(settings)
     for number in STOPS:
         _when(number, partial(_end_at_once, bound))
@@ -73,6 +74,7 @@ async def _run(settings: Settings, load: Loader) -> None:
     finally:
         bound.close()
         end_all()  # threads may wait for a model that is being opened, and the end waits for threads
+    served.set()  # and for one that waits for a name of a host, or for a disk, it waits END_S in all
 
 
 def _abort(how: int) -> None:
@@ -111,9 +113,10 @@ def _end_at_once(bound: Bound) -> None:
     os._exit(0)
 
 
-def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
+def _end_surely(loop: asyncio.AbstractEventLoop, served: threading.Event) -> None:
     """See to it that a stop ends the process even where the loop's thread never comes back from a model.
 
+    It is a failure, unless all has been `served` by then, and threads alone are not done.
     Python's own handlers wait for that thread. What a signal writes to the wakeup descriptor any thread can read; we
     take the loop's place there, so we wake it, too.
     """
@@ -129,9 +132,10 @@ def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
                 pass  # the loop is closed: what is left is the end of the process
             if number[0] in STOPS:
                 time.sleep(END_S)
-                log.error("ended by force: it did not end by itself", seconds=END_S)
+                if not served.is_set():
+                    log.error("ended by force: it did not end by itself", seconds=END_S)
                 logging.close()  # what was said last is read before the process is gone
-                os._exit(1)
+                os._exit(0 if served.is_set() else 1)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
 

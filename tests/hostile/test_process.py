@@ -9,7 +9,7 @@ import pytest
 
 from gestured.core.errors import ModelError
 from gestured.model.opening import open_model
-from tests.daemon.harness import Daemon, Sensor, counted, lines_of
+from tests.daemon.harness import Daemon, Hand, Sensor, counted, lines_of
 from tests.hostile import bad_models
 from tests.hostile.grammar import TYPES, violations
 
@@ -37,11 +37,16 @@ def test_after_a_kill_the_next_daemon_takes_the_place(start) -> None:
     assert again.line()["sequence"] == 1
 
 
+def injected(**settings: Path) -> dict[str, str]:
+    """The environment of a daemon that INJECT changes, with these settings of it."""
+    path = os.pathsep.join((str(INJECT), *filter(None, [os.environ.get("PYTHONPATH")])))
+    return {"PYTHONPATH": path} | {name: str(value) for name, value in settings.items()}
+
+
 def test_the_wall_clock_may_step_by_an_hour(start, tmp_path: Path) -> None:
     clock = tmp_path / "clock"
     clock.write_text("0")
-    path = os.pathsep.join((str(INJECT), *filter(None, [os.environ.get("PYTHONPATH")])))
-    daemon = start("--clock", "sensor", env={"HOSTILE_CLOCK": str(clock), "PYTHONPATH": path})
+    daemon = start("--clock", "sensor", env=injected(HOSTILE_CLOCK=clock))
     client = daemon.client().subscribe(*TYPES)
     sensor = Sensor(daemon, "arm").begin().perform("left")
     lines = [client.line() for _ in range(3)]
@@ -165,6 +170,21 @@ def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Pa
         assert alive(tried)
         assert daemon.stop() == 0
     assert not alive(tried) and "Traceback" not in daemon.stderr()
+
+
+def test_a_stop_while_a_reload_waits_for_a_name_ends_as_asked(start, tmp_path: Path) -> None:
+    config, asked = tmp_path / "gestured.toml", tmp_path / "asked"
+    config.write_text("")
+    daemon = start("--clock", "sensor", "--config", config, env=injected(HOSTILE_NAMES=asked))
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().send(Hand().tap(), Hand().idle(0.2))
+    config.write_text('publish = ["osc://hangs:9001"]')
+    daemon.signal(signal.SIGHUP)
+    while not asked.exists():
+        pass
+    assert daemon.stop() == 0
+    assert client.line()["gesture"] == "one_tap" and not daemon.socket.exists()
+    assert "Traceback" not in daemon.stderr() and "force" not in daemon.stderr()
 
 
 def test_the_end_does_not_wait_for_an_answer_that_never_comes(start, model: Path, tmp_path: Path) -> None:
