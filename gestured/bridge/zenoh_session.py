@@ -37,6 +37,7 @@ class Zenoh:
         self._forward = Forward(self._key(), args.to, counts) if args.frames else None
         self._session: Any = None
         self._tokens: dict[str, Any] = {}
+        self._holding = threading.Lock()  # for the tokens: the thread that opens the session holds them first
         self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
         self._closed = threading.Event()
         self._opening = threading.Thread(target=self._open, name="zenoh", daemon=True)
@@ -116,14 +117,15 @@ class Zenoh:
         """A token for the daemon and for each sensor that is heard now."""
         if self._session is None:
             return
-        alive = set()
-        if self._daemon.hello:
-            heard = (name for name, state in self._daemon.states.items() if state in HEARD)
-            alive = {self._key("alive"), *(self._key(name, "alive") for name in heard)}
-        for key in self._tokens.keys() - alive:
-            self._tokens.pop(key).undeclare()
-        for key in alive - self._tokens.keys():
-            self._tokens[key] = self._session.liveliness().declare_token(key)
+        with self._holding:
+            alive = set()
+            if self._daemon.hello:
+                heard = (name for name, state in self._daemon.states.items() if state in HEARD)
+                alive = {self._key("alive"), *(self._key(name, "alive") for name in heard)}
+            for key in self._tokens.keys() - alive:
+                self._tokens.pop(key).undeclare()
+            for key in alive - self._tokens.keys():
+                self._tokens[key] = self._session.liveliness().declare_token(key)
         if self._reached() and self._daemon.hello:
             self._counts.ready(site=self._site)
 

@@ -5,6 +5,7 @@ import json
 import queue
 import select
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -292,11 +293,37 @@ def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
     assert [became(name) for name in ("c", "a", "b")] == ["sent", "sent", "overflow"]
 
 
-def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
-    """Said once, and tried again with growing pauses, two seconds at most: a router that comes is found soon."""
+def unconnected() -> Zenoh:
+    """What a bridge has of Zenoh, to a router that is not there."""
     parser = argparse.ArgumentParser()
     zenoh_command.add(parser.add_subparsers())
-    session = Zenoh(parser.parse_args(["zenoh", "--site", "car", "--connect", "tcp/127.0.0.1:1"]), Counts("zenoh"))
+    return Zenoh(parser.parse_args(["zenoh", "--site", "car", "--connect", "tcp/127.0.0.1:1"]), Counts("zenoh"))
+
+
+def test_a_line_that_comes_while_the_session_is_opened_declares_no_token_twice():
+    """The one that is thrown away would be undeclared, and tell others that the daemon is gone."""
+    bridge, declared = unconnected(), list[str]()
+    other = threading.Thread(target=bridge._hold_tokens)
+
+    def declare(key: str) -> object:
+        declared.append(key)
+        if other.ident is None:
+            other.start()
+            other.join(0.2)  # it would be done by now
+        return object()
+
+    bridge._daemon.take(HELLO)
+    liveliness = SimpleNamespace(declare_token=declare)
+    info = SimpleNamespace(routers_zid=lambda: ["router"])
+    bridge._session = SimpleNamespace(liveliness=lambda: liveliness, info=info)
+    bridge._hold_tokens()
+    other.join()
+    assert declared == ["gestured/car/alive"]
+
+
+def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
+    """Said once, and tried again with growing pauses, two seconds at most: a router that comes is found soon."""
+    session = unconnected()
     pauses: list[float] = []
     closed = SimpleNamespace(is_set=lambda: len(pauses) == 8, wait=pauses.append)
     monkeypatch.setattr(session, "_closed", closed)
