@@ -13,6 +13,7 @@ from gestured.core.frames import Segment
 from gestured.core.window import Window
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
+from tests.daemon.trust import MAKER
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
 GESTURES = ("one_tap", "swipe_up")
@@ -97,9 +98,13 @@ def build(
     extra: str = "",
     drop: tuple[str, ...] = (),
     keep_graph: bool = True,
+    maker: str = MAKER,
     **metadata: str,
 ) -> Path:
-    """A small real ONNX model with everything that the contract asks for; the arguments break it."""
+    """A small real ONNX model with everything that the contract asks for; the arguments break it.
+
+    Without its `maker` it is tried in a process of its own, as somebody else's is (tests/daemon/trust.py).
+    """
     pytest.importorskip("onnx", reason="building test models needs the extra [lab]")
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -159,6 +164,7 @@ def build(
         tensors,
     )
     proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    proto.producer_name = "" if extra else maker
     props = properties(takes) | metadata
     helper.set_model_props(proto, {k: v for k, v in props.items() if k not in drop})
     if not keep_graph:

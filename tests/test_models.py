@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks import inside
+from benchmarks.traffic import touched
 from gestured.core.errors import ModelError
 from gestured.core.frames import Before
 from gestured.core.own import EXAMPLES
@@ -338,7 +339,8 @@ def test_a_file_whose_opening_never_ends_is_given_up(tmp_path: Path, monkeypatch
 
 def test_what_kills_onnxruntime_kills_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model_process, "START", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
-    assert "SIGSEGV" in refusal(build(tmp_path / "m.onnx"))
+    (tmp_path / "m.onnx").write_bytes(b"any bytes")
+    assert "SIGSEGV" in refusal(tmp_path / "m.onnx")
 
 
 def test_a_file_is_tried_with_few_variables_and_no_descriptors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -350,7 +352,8 @@ def test_a_file_is_tried_with_few_variables_and_no_descriptors(tmp_path: Path, m
     )  # fmt: skip
     with open(tmp_path / "open", "w") as file:
         os.set_inheritable(file.fileno(), True)
-        message = refusal(build(tmp_path / "m.onnx"))
+        (tmp_path / "m.onnx").write_bytes(b"any bytes")
+        message = refusal(tmp_path / "m.onnx")
     assert "ORT_DISABLE_TELEMETRY" in message and "NOTIFY_SOCKET" not in message and "HOME" not in message
     assert message.endswith(" / [0, 1, 2]")
 
@@ -360,7 +363,7 @@ def test_a_folder_of_the_same_name_is_not_taken_for_the_program(
 ) -> None:
     (tmp_path / "gestured").mkdir()
     (tmp_path / "gestured" / "__init__.py").write_text("raise SystemExit('not this one')")
-    build(tmp_path / "mine.onnx")
+    build(tmp_path / "mine.onnx", maker="")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend("")
     assert open_model("mine.onnx").name == "mine"
@@ -368,7 +371,7 @@ def test_a_folder_of_the_same_name_is_not_taken_for_the_program(
 
 def test_opening_leaves_the_limits_of_the_process_as_they_were(tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
-    open_model(build(tmp_path / "good.onnx"))
+    open_model(build(tmp_path / "good.onnx", maker=""))
     refusal(build(tmp_path / "bad.onnx", extra="bomb"))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
     with ThreadPoolExecutor(2) as pool:  # as a reload does it beside the loop
@@ -587,7 +590,8 @@ def test_models_that_ship(name: str) -> None:
     assert np.isfinite(model.classify(segment()).values).all()
 
 
-def test_the_bench_asks_a_model_for_what_the_daemon_asks() -> None:
+def test_the_bench_asks_a_model_for_what_the_daemon_asks(monkeypatch: pytest.MonkeyPatch) -> None:
     """A model may have a further input; the bare run that it is compared with must give it, too."""
+    monkeypatch.setattr(inside, "touched", lambda seed, seconds: touched(seed, 10.0))
     row = inside.recognise("cnn_lstm")
     assert float(row.ratio.split()[0]) > 0

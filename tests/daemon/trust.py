@@ -1,4 +1,4 @@
-"""The tests' own small model is taken at its word.
+"""The tests' own small models are taken at their word.
 
 A model that does not ship is first tried in a process of its own, which takes a fifth of a daemon's start.
 """
@@ -13,7 +13,7 @@ MAKER = "gestured tests"  # stands at the head of the file as its producer
 
 
 def trust() -> None:
-    """From now on this process tries models of `tiny_model.make` itself, and others as ever."""
+    """From now on this process tries models of `tiny_model.make` and `small_model.build` itself, and others as ever."""
     opening: Any = import_module("gestured.model.opening")
 
     def tried(data: bytes) -> object:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gestured.client.control import Control
@@ -169,6 +169,7 @@ values = st.recursive(leaves, lambda inner: st.lists(inner) | st.dictionaries(wo
 spaces = st.sampled_from([(",", ":"), (", ", ": "), (" ,  ", "\t:\r")])
 
 
+@settings(max_examples=40)
 @given(st.dictionaries(words, values, max_size=4), words, st.booleans(), spaces)
 def test_a_text_is_what_json_says(parser, around: dict[str, Any], text: str, ascii_: bool, separators: Any):
     line = json.dumps(around | {"key": text}, ensure_ascii=ascii_, separators=separators).encode()
@@ -179,6 +180,7 @@ def test_a_text_is_what_json_says(parser, around: dict[str, Any], text: str, asc
     assert parser.text(json.dumps(around).encode(), out, ctypes.c_size_t(200)) == 0
 
 
+@settings(max_examples=40)
 @given(st.dictionaries(words, values, max_size=4), st.floats(-1e18, 1e18) | st.integers(-(2**53), 2**53))
 def test_a_number_is_what_json_says(parser, around: dict[str, Any], number: float):
     out = ctypes.c_double()

@@ -82,8 +82,9 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
 
 
 def test_a_recording_of_one_frame_is_no_place_and_a_blink_is_no_hour(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
     for name, count, rate_hz in (("one", 1, 15.0), ("blink", 300, 1e6), ("good", 60, 15.0)):
         frames, of = np.zeros((count, 9, 9), np.uint8), {"labels": np.array([NONE]), "subjects": np.array([0])}
         offsets = np.array([0, count])
@@ -237,8 +238,9 @@ def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused
     ],
 )
 def test_what_cannot_be_is_said_in_one_sentence(
-    flags: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    flags: list[str], words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
     assert main(["everyday", *flags]) == 1
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab: ")]
     assert words in line

@@ -31,6 +31,7 @@ def small_world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch)
     """What is simulated is made once for all tests, and little."""
     monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
     monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
+    monkeypatch.setattr(own, "FOLDS", 2)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from experiments.foreign.recordings import recordings
 from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.made_of import LINE
+from gestured.lab.study import cohort
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
@@ -30,6 +31,7 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
     small = Plan.small
     monkeypatch.setattr(Plan, "small", lambda seed: replace(small(seed), steps=4, timed=2))
+    monkeypatch.setattr(cohort, "in_processes", lambda make, todo, *_: map(make, todo))
     (tmp_path / "none").mkdir()
     write(tmp_path / "foreign.npz", recordings(1))
     where = ["--cache", str(tmp_path / "cache"), "--real", str(tmp_path / "none"), "--jobs", "1"]
