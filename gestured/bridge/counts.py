@@ -18,6 +18,7 @@ HELP = {
     "connected": "Whether the other side is there",
     "reconnects": "How often the other side was found again",
 }
+ASK_S = 5.0  # between two pieces of a request for metrics: a connection costs a thread and a descriptor
 
 
 class Counts:
@@ -90,4 +91,6 @@ class Counts:
             server, _ = prometheus_client.start_http_server(address.port, address.host, registry)
         except OSError as error:
             raise BridgeError(f"--metrics {address}: {error.strerror}: choose another address") from None
+        server.RequestHandlerClass.timeout = ASK_S  # type: ignore[attr-defined]
+        server.handle_error = lambda *_: None  # type: ignore[method-assign] # who asks too slowly is nobody's bug
         self._metrics = str(Address(address.host, server.server_port))
