@@ -110,7 +110,7 @@ class Banks:
         `sources` are those of all packets. `others`: sensors of other packets, which must not be overtaken.
         """
         left: dict[int, tuple[Block, int]] = {}
-        names: set[str] = set()
+        names, arrived = set[str](), list[str]()
         for block in blocks:
             others = others.union(names.intersection(block.sensors))
             names.update(block.sensors)
@@ -119,11 +119,13 @@ class Banks:
             for bank in self._banks.values():
                 try:
                     for taken in bank.take(block, sources, others, now):
-                        facts.append(Arrived(tuple(map(block.sensors.__getitem__, taken)), 1, 0, 0, 0, 0))
+                        arrived += map(block.sensors.__getitem__, taken)
                         waits[taken] = False
                 except Exception as error:  # a bug: what was not taken until then is taken one by one
                     facts.append(Fault(None, error))
             left |= {block.packets[n]: (block, n) for n in waits.nonzero()[0].tolist()}
+        if arrived:
+            facts.append(Arrived(tuple(arrived), 1, 0, 0, 0, 0))
         return left
 
 

@@ -19,9 +19,9 @@ class Decided(NamedTuple):
 
 
 class Arrived(NamedTuple):
-    """What became of the frames of sensors that were found waiting together; the counts are those of each of them."""
+    """What became of the frames of sensors that were found waiting together; the counts are those of each name."""
 
-    sensors: tuple[str, ...]
+    sensors: tuple[str, ...]  # one that several frames came of may stand here as often
     taken: int
     lost: int  # frames missing before these: by the sensor's counter, or as this machine had no room for packets
     duplicates: int
