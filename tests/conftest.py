@@ -59,8 +59,8 @@ def clean_environment() -> tempfile.TemporaryDirectory[str]:
 _cleaned = clean_environment()  # before any test module is imported
 trust()
 
-# No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.
-settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# No test asserts a time, and on a loaded machine Hypothesis' own limits would be one. Each run draws other examples.
+settings.register_profile("any machine", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
 

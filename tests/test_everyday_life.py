@@ -10,19 +10,19 @@ from gestured.simulator.everyday import TAP_S, Happening, day, planned
 from gestured.simulator.places import ANYWHERE, FINGERS, PLACES, Place
 from gestured.simulator.resting import HAND, NOBODY, POSTURES
 
-HOUR_S = 3600.0
+LONG_S = 1800.0
 
 
 @cache
 def life(place: str) -> list[Happening]:
-    """All that nobody means in an hour of somebody at a place."""
-    return planned(1, PLACES[place], HOUR_S).life
+    """All that nobody means in half an hour of somebody at a place."""
+    return planned(1, PLACES[place], LONG_S).life
 
 
 def test_all_that_may_happen_happens_somewhere_and_leaves_a_mark_that_a_sensor_can_take() -> None:
     made = [one for place in PLACES for _, one in life(place)]
     assert {one.kind for one in made} == {*ANYWHERE, *FINGERS, *POSTURES} - {NOBODY}
-    by_chance = [one for place in CHANCE.values() for _, one in planned(1, place, HOUR_S).life]
+    by_chance = [one for place in CHANCE.values() for _, one in planned(1, place, LONG_S).life]
     assert {one.kind for one in by_chance} == {"anything", "lies"}
     for one in made + by_chance:
         assert one.contacts, one.kind
@@ -33,8 +33,8 @@ def test_all_that_may_happen_happens_somewhere_and_leaves_a_mark_that_a_sensor_c
 
 
 def test_there_are_contacts_enough_and_gestures_among_them() -> None:
-    days = [day(seed, place, HOUR_S / 6) for seed, place in enumerate(PLACES.values())]
-    assert sum(one.contacts for one in days) / (len(days) / 6) >= 200
+    days = [day(seed, place, LONG_S / 6) for seed, place in enumerate(PLACES.values())]
+    assert sum(one.contacts for one in days) / (len(days) / 12) >= 200
     assert sum(len(one.meant) for one in days) >= 5
 
 
@@ -49,6 +49,6 @@ def test_a_free_finger_taps_only_where_nobody_lies_and_a_playing_one_only_where_
 
 @pytest.mark.parametrize("place", CHANCE.values(), ids=list(CHANCE))
 def test_chance_draws_no_tap(place: Place) -> None:
-    lone = [one for _, one in planned(1, place, HOUR_S).life if len(one.contacts) == 1]
+    lone = [one for _, one in planned(1, place, LONG_S).life if len(one.contacts) == 1]
     assert len(lone) > 20
     assert all(one.contacts[0].length >= NARROW_MM or one.duration_s > TAP_S for one in lone)
