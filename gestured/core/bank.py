@@ -9,7 +9,6 @@ the last bit: `matmul` of a stack of grids gives what `dot` gives of each, and e
 import math
 from collections.abc import Iterator, Sequence
 from itertools import repeat
-from operator import eq
 from typing import Any
 
 import numpy as np
@@ -239,7 +238,7 @@ class Bank:
         if block.values.shape[1:] != self._front.grid_sent:
             return
         owners, sent = map(self._owners.get, block.sensors), map(sources.__getitem__, block.packets)
-        mine = np.fromiter(map(eq, sent, owners), np.bool_, len(block.packets))
+        mine = np.array([source == owner for source, owner in zip(sent, owners, strict=True)])
         if others:
             mine &= [name not in others for name in block.sensors]
         rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
