@@ -27,7 +27,7 @@ def test_a_slow_client_is_told_what_it_lost_and_others_get_everything(start) -> 
     quick = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
     done = 0
-    while done < 600 or daemon.metric("gestured_client_lines_lost_total") == 0:
+    while daemon.metric("gestured_client_lines_lost_total") == 0:
         sensor.perform(*["tap"] * 20)
         done += 20
         assert [e["sequence"] for e in quick.events("gesture", "arm", 20)] == list(range(done - 19, done + 1))
