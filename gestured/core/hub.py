@@ -9,7 +9,8 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 """
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -44,8 +45,8 @@ class Hub:
         self._missed = 0  # times that this machine had no room for a packet
         self._missed_read = 0  # what `_missed` was when packets were read last
         self._missed_before: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
-        # Sources that own a sensor and were heard within the last minute, as of the last tick.
-        self.owners: frozenset[Source] = frozenset()
+        # How many sensors each source owns that was heard within the last minute, as of the last tick.
+        self.owners: Mapping[Source, int] = {}
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._ticked = -math.inf  # s, the last tick
@@ -155,7 +156,7 @@ class Hub:
         sensors = self._sensors.values()
         self._banks.show()
         self._ticked = now
-        self.owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
+        self.owners = Counter(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
             sensor.review(now, facts)
             if not sensor.silent and sensor.stale(now):

@@ -32,6 +32,14 @@ class Datagram(NamedTuple):
     source: Source
 
 
+class Group(NamedTuple):
+    """Packets of one sender that arrived together, as they are served in a flood."""
+
+    sender: Sender
+    packets: list[Packet]
+    arrival: float  # s, monotonic, of the last of them
+
+
 class Backlog:
     """The packets that were read and not yet served, oldest first.
 
@@ -103,7 +111,7 @@ class Backlog:
         self._bytes -= ends[n - 1]
         return found, arrival
 
-    def share(self, seconds: float, now: float) -> tuple[list[Datagram], dict[Sender, list[bytes]]]:
+    def share(self, seconds: float, now: float) -> tuple[list[Group], dict[Sender, list[bytes]]]:
         """In a flood: what is to be served in a turn of so many seconds, and which packets of whom were dropped.
 
         Nothing waits after it. A packet that costs more than a turn is served once so many turns have passed, since
@@ -122,21 +130,21 @@ class Backlog:
         before = self._equal
         self._equal += min((shares[key] for key in owners), default=OWNERS_SHARE * seconds)
         self._turns = min(self._turns + seconds, CREDIT_S)
-        served: list[Datagram] = []
+        served: list[Group] = []
         dropped: dict[Sender, list[bytes]] = {}
         for key in sorted(by_sender, key=needs.__getitem__):
             kept = self._newest(key, by_sender[key], shares[key], before, seconds)
-            served += kept
+            served += _groups(key, kept)
             if left := by_sender[key][: len(by_sender[key]) - len(kept)]:
                 dropped[key] = [datagram.packet for datagram in left]
         if dropped:
             self.flood(now + FLOOD_S)
         return served, dropped
 
-    def took(self, datagram: Datagram, seconds: float) -> None:
-        """A packet of a flood was served, and cost so much."""
-        key = self.sender(datagram.source)
-        cost = seconds / len(datagram.packet) if datagram.packet else 0.0
+    def took(self, group: Group, seconds: float) -> None:
+        """A group of a flood was served, and cost so much."""
+        key, size = group.sender, sum([len(packet) for packet, _ in group.packets])
+        cost = seconds / size if size else 0.0
         if len(self._cost) < REMEMBERED_SENDERS or key in self._cost:
             before = self._cost.get(key, cost)
             self._cost[key] = before + NEWEST * (cost - before)
@@ -168,6 +176,16 @@ class Backlog:
         if len(self._credit) < REMEMBERED_SENDERS or key in self._credit:
             self._credit[key] = credit, self._equal
         return kept[::-1]
+
+
+def _groups(sender: Sender, datagrams: Sequence[Datagram]) -> list[Group]:
+    """What a sender sent, oldest first, in groups: that a frame costs less beside others holds in a flood, too."""
+    groups: list[list[Datagram]] = []
+    for datagram in datagrams:
+        if not groups or datagram.arrival - groups[-1][0].arrival >= TOGETHER_S:
+            groups.append([])
+        groups[-1].append(datagram)
+    return [Group(sender, [(packet, source) for _, packet, source in some], some[-1].arrival) for some in groups]
 
 
 def fair(needs: dict[Sender, float], seconds: float) -> dict[Sender, float]:

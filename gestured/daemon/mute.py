@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from gestured.core.owner import Source
 
-TOO_MUCH = 64 << 10  # bytes that are dropped of a sender within a second, after which it is muted
+# Bytes that are dropped of a sender within a second, for each sensor that it owns, after which it is muted. A source of
+# many sensors that a slow machine cannot follow loses frames of all of them, but it is no flood.
+TOO_MUCH = 64 << 10
 HEADER_BYTES = 512  # that a packet takes in the kernel's buffer beside its own
 FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts twice as long as the one before
 LONGEST_S = 8.0  # the longest that a sender is muted, so that one that has mended its flood is heard soon
@@ -36,8 +38,13 @@ class Muted:
         self._dropped: dict[Sender, int] = {}  # by sender: bytes that were dropped since `_since`
         self._since = 0.0  # s, when the second began in which that is counted
 
-    def blame(self, dropped: Mapping[Sender, Collection[bytes]], now: float) -> list[Sender]:
-        """The senders that are muted from `now` on, since these packets of theirs had to be dropped."""
+    def blame(
+        self, dropped: Mapping[Sender, Collection[bytes]], now: float, owners: Mapping[Source, int]
+    ) -> list[Sender]:
+        """The senders that are muted from `now` on, since these packets of theirs had to be dropped.
+
+        `owners`: how many sensors each source owns.
+        """
         if now - self._since > 1.0:
             self._dropped, self._since = {}, now
         found: list[Sender] = []
@@ -45,7 +52,8 @@ class Muted:
             size = self._dropped.get(sender, 0) + sum(map(len, packets)) + HEADER_BYTES * len(packets)
             self._dropped[sender] = size
             until, before = self._until.get(sender, (0.0, 0.0))
-            if size >= TOO_MUCH and now >= until:
+            bearable = TOO_MUCH * (1 if isinstance(sender, str) else max(owners.get(sender, 1), 1))
+            if size >= bearable and now >= until:
                 again = now < until + 2 * LONGEST_S
                 length = min(LONGEST_S, 2 * before) if again and before else FIRST_S
                 self._until[sender] = now + length, length

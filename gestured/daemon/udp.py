@@ -86,7 +86,7 @@ class Receiver:
         pause_s = now - self._looked
         thick, self._sparse, self._looked = pause_s < PAUSE_S, pause_s >= SPARSE_S, now
         self.read()
-        if thick:
+        if thick and not self._backlog.flooded(now):  # in a flood nothing is put off
             self._loop.remove_reader(self._sock)
             self._pause = self._loop.call_later(PAUSE_S, self._listen)
 
@@ -189,19 +189,19 @@ class Receiver:
     def _work_fairly(self, now: float) -> None:
         served, dropped = self._backlog.share(FLOOD_SLICE_S, now)
         start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
-        for n, datagram in enumerate(served):
+        for n, group in enumerate(served):
             if before > start + TURN_S:
                 for left in served[n:]:
-                    dropped.setdefault(self._backlog.sender(left.source), []).append(left.packet)
+                    dropped.setdefault(left.sender, []).extend(packet for packet, _ in left.packets)
                 break
-            self._serve([(datagram.packet, datagram.source)], datagram.arrival)
+            self._serve(group.packets, group.arrival)
             after = time.thread_time()
-            self._backlog.took(datagram, after - before)
+            self._backlog.took(group, after - before)
             before = after
         if dropped:
             self._desk.drop("flood", count=sum(map(len, dropped.values())))
             self._hub.missed()
-            if blamed := self._muted.blame(dropped, now):
+            if blamed := self._muted.blame(dropped, now, self._hub.owners):
                 self._desk.muted(blamed)
                 self._mute(now, blamed)
                 self._backlog.flood(now + LONGEST_S + FLOOD_S)  # those who are heard again are held back at once

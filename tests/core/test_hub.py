@@ -360,12 +360,12 @@ def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
     hub = Hub(SCENE, Sure())
     hub.receive([(floats("/arm/pressure", Hand().frame(), 0), FIRST)], 1.0)
     hub.tick(1.0)
-    assert hub.owners == {FIRST}
+    assert hub.owners == {FIRST: 1}
     hub.tick(0.8 * FORGET_S)
     hub.tick(0.9 * FORGET_S)
-    assert states(hub, 0.9 * FORGET_S) == {"arm": "stale"} and hub.owners == {FIRST}
+    assert states(hub, 0.9 * FORGET_S) == {"arm": "stale"} and hub.owners == {FIRST: 1}
     hub.tick(1.1 + FORGET_S)
-    assert hub.owners == set()
+    assert hub.owners == {}
 
 
 def test_a_frame_that_says_nothing_is_cheap() -> None:

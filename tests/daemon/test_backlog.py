@@ -85,10 +85,13 @@ def flood(
         packets = [(FRAME, source) for source, count in senders.items() for _ in range(count)]
         waiting.add(packets, [now] * len(packets))
         found, dropped = waiting.share(seconds, now)
-        assert len(found) + sum(map(len, dropped.values())) == sum(senders.values()) and not waiting
-        for datagram in found:
-            waiting.took(datagram, cost)
-            served[datagram.source] += 1
+        assert (
+            sum(len(group.packets) for group in found) + sum(map(len, dropped.values())) == len(packets) and not waiting
+        )
+        for group in found:
+            waiting.took(group, cost * len(group.packets))
+            for _, source in group.packets:
+                served[source] += 1
     return served
 
 
@@ -115,9 +118,9 @@ def test_who_sends_now_and_then_has_saved_up_for_it_where_many_owners_flood() ->
         if turn % 10 == 0:
             waiting.add([(FRAME, source) for source in good], [now] * len(good))
             sent += len(good)
-        for datagram in waiting.share(0.001, now)[0]:
-            waiting.took(datagram, 3.75e-7 * len(datagram.packet))
-            served += datagram.source in good
+        for group in waiting.share(0.001, now)[0]:
+            waiting.took(group, 3.75e-7 * sum(len(packet) for packet, _ in group.packets))
+            served += sum(source in good for _, source in group.packets)
     assert served == sent
 
 
@@ -128,8 +131,19 @@ def test_a_stranger_is_heard_beside_owners_that_flood() -> None:
 def test_the_newest_of_what_is_too_much_is_served() -> None:
     waiting = backlog()
     waiting.add([(b"%4d" % n * 100, ARM) for n in range(1000)], [n / 1000 for n in range(1000)])
-    found, _ = waiting.share(0.001, 1.0)
-    assert found and [int(datagram.packet[:4]) for datagram in found] == list(range(1000 - len(found), 1000))
+    found = [int(packet[:4]) for group in waiting.share(0.001, 1.0)[0] for packet, _ in group.packets]
+    assert found and found == list(range(1000 - len(found), 1000))
+
+
+def test_in_a_flood_what_a_sender_sent_together_is_served_together() -> None:
+    waiting = backlog()
+    arrivals = [0.0, TOGETHER_S / 2, 1.0, 1.0]
+    waiting.add([(b"%d" % n, ARM if n < 3 else STRANGER) for n in range(4)], arrivals)
+    groups, _ = waiting.share(0.001, 1.0)
+    assert sorted((group.sender, [packet for packet, _ in group.packets], group.arrival) for group in groups[1:]) == [
+        (ARM, [b"0", b"1"], TOGETHER_S / 2), (ARM, [b"2"], 1.0),
+    ]  # fmt: skip
+    assert groups[0] == (STRANGER[0], [(b"3", STRANGER)], 1.0)
 
 
 def test_a_packet_that_costs_more_than_a_turn_has_its_turn_in_the_end() -> None:

@@ -92,8 +92,9 @@ NEARLY, ENOUGH = [bytes(TOO_MUCH - 2 * HEADER_BYTES)], [b""]  # too much only to
 def test_who_floods_is_muted_for_longer_each_time_but_never_for_good() -> None:
     muted, now, lengths = Muted(), 0.0, []
     for _ in range(6):
-        assert muted.blame({HOST: NEARLY}, now) == []
-        assert muted.blame({HOST: ENOUGH}, now) == [HOST] and muted.blame({HOST: 9 * NEARLY}, now) == []
+        assert muted.blame({HOST: NEARLY}, now, {}) == []
+        assert muted.blame({HOST: ENOUGH}, now, {}) == [HOST]
+        assert muted.blame({HOST: 9 * NEARLY}, now, {}) == []
         start = now
         assert muted.rules(now, [OWNER]) == [Rule(*OWNER, True), Rule(HOST, None, False)]
         while not muted.over(now):
@@ -103,13 +104,19 @@ def test_who_floods_is_muted_for_longer_each_time_but_never_for_good() -> None:
         now += 1.5
     assert lengths == [FIRST_S, 2 * FIRST_S, 4 * FIRST_S, LONGEST_S, LONGEST_S, LONGEST_S]
     now += 3 * LONGEST_S
-    assert muted.over(now) == [] and muted.blame({HOST: NEARLY + ENOUGH}, now) == [HOST]
+    assert muted.over(now) == [] and muted.blame({HOST: NEARLY + ENOUGH}, now, {}) == [HOST]
     assert muted.over(now + FIRST_S) == [HOST]  # what was long ago is forgotten
 
 
 def test_an_owner_that_floods_is_muted_alone() -> None:
     muted = Muted()
-    muted.blame({OWNER: NEARLY + ENOUGH, HOST: [b""] * (TOO_MUCH // HEADER_BYTES)}, 1.0)
+    muted.blame({OWNER: NEARLY + ENOUGH, HOST: [b""] * (TOO_MUCH // HEADER_BYTES)}, 1.0, {OWNER: 1})
     assert muted.rules(1.0, [OWNER, (HOST, 6), ("10.0.0.2", 5)]) == [
         Rule(*OWNER, False), Rule(HOST, 6, True), Rule(HOST, None, False),
     ]  # fmt: skip
+
+
+def test_what_is_dropped_of_a_source_counts_for_each_of_its_sensors() -> None:
+    muted, once = Muted(), NEARLY + ENOUGH
+    assert muted.blame({OWNER: 9 * once}, 0.2, {OWNER: 10}) == []
+    assert muted.blame({OWNER: once}, 0.5, {OWNER: 10}) == [OWNER]

@@ -3,6 +3,7 @@
 import struct
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Sequence
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,7 +47,8 @@ class Machine:
         self.now, self.worked_s = START_S, 0.0
         self.admitted: list[float] = []  # s, when packets came for which there was room
         self.served: list[tuple[bytes, Source]] = []
-        self.owners: set[Source] = set()  # those who were served before the last tick
+        self.owners: dict[Source, int] = {}  # sensors of those who were served before the last tick
+        self.each = 1  # sensors that a source owns
         self.due = float("inf")
         self._sent, self._cost = deque((START_S + t, packet, source) for t, packet, source in sorted(sent)), cost
         self._buffer: deque[Sent] = deque()
@@ -172,7 +174,7 @@ def run(machine: Machine, seconds: float, look: Callable[[Receiver], None] = lam
         def tick() -> None:
             machine.call_later(TICK_S, tick)
             receiver.read()
-            machine.owners = {source for _, source in machine.served}
+            machine.owners = {source: machine.each for _, source in machine.served}
 
         tick()
         while machine.now < START_S + seconds:
@@ -213,6 +215,17 @@ def test_while_owners_send_full_packets_nobody_else_loses_one(ports: int, cost_s
     heard = Counter(int(packet) for packet, (host, _) in machine.served if host == "10.0.0.1")
     assert sum(heard.values()) >= 0.97 * len(good)
     assert sum(heard[n] for n in range(30, 145)) >= 0.99 * 4 * 115  # by then it was seen to be a flood
+
+
+def test_a_source_of_many_sensors_that_cannot_be_followed_is_heard_all_the_while() -> None:
+    """Three hundred sensors behind one address come to more work than there is time, as while they are learned."""
+    frames = [(0.01 + n / 15 + k / 4500, b"%3d" % k * 130, ("10.0.0.1", 1)) for n in range(120) for k in range(300)]
+    machine = Machine(frames, lambda packet: 1e-3)
+    machine.each = 300
+    served: list[tuple[float, int]] = []
+    run(machine, 8.0, lambda receiver: served.append((machine.now - START_S, len(machine.served))))
+    by_second = [max(count for t, count in served if t <= second) for second in range(1, 9)]
+    assert min(later - before for before, later in pairwise(by_second)) >= 0.3 / 1e-3
 
 
 @pytest.mark.parametrize("look_s", [0.0003, 0.0015, 0.012])
