@@ -18,7 +18,7 @@ from tests.deploy.compilers import HEADERS, HERE
 SKETCH = HEADERS / "examples" / "Matrix" / "Matrix.ino"
 CORE = Path("/usr/share/arduino/hardware/arduino")  # Debian's arduino-core-avr
 BUILDER = Path("/usr/share/arduino-builder")
-SIMULATOR = Path("/usr/include/simavr/sim_avr.h")
+SIMULATOR = (Path("/usr/include/simavr/sim_avr.h"), Path("/usr/include/libelf.h"))  # libsimavr-dev, libelf-dev
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def firmware(tmp_path: Path) -> Callable[..., Path]:
 @pytest.fixture(scope="module")
 def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The simulated board."""
-    if not SIMULATOR.exists():
+    if not all(header.exists() for header in SIMULATOR):
         pytest.skip("Debian's libsimavr-dev and libelf-dev are not installed")
     out = tmp_path_factory.mktemp("board") / "board"
     command = ["gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", out, HERE / "board.c", "-lsimavr", "-lelf"]
