@@ -50,11 +50,16 @@ class Bound:
         """Where the daemon can be reached, from whatever folder."""
         return {
             "listen": name_of(self.udp),
-            "socket": str(self.events.path.absolute()),
-            "control": str(self.control.path.absolute()),
-            "gates": str(self.gates.path.absolute()) if self.gates else None,
+            "socket": _from_anywhere(self.events.path),
+            "control": _from_anywhere(self.control.path),
+            "gates": _from_anywhere(self.gates.path) if self.gates else None,
             "metrics": name_of(self.http) if self.http else None,
         }
+
+
+def _from_anywhere(path: Path) -> str:
+    """The path itself, or where a relative one leads: without "..", since a socket's path has 107 bytes at most."""
+    return str(path if path.is_absolute() else path.parent.resolve() / path.name)
 
 
 def bind_all(settings: Settings) -> Bound:
