@@ -355,7 +355,7 @@ class Hub:
 
     def _new(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
         """A sensor that was not heard before, or None where there is no place for it."""
-        if self._full(name, now):
+        if self._full(name, now, facts):
             facts.append(Dropped("too_many_sensors", source))
             return None
         numbers = self._numbers.pop(name, (0, 0))
@@ -367,7 +367,7 @@ class Hub:
         sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
         return sensor
 
-    def _full(self, name: str, now: float) -> bool:
+    def _full(self, name: str, now: float, facts: list[Fact]) -> bool:
         """Whether there is no place for a new sensor; places for those of the scene are kept free.
 
         One packet can hold hundreds of names: where there is no place, they are not each held against all sensors.
@@ -385,7 +385,8 @@ class Hub:
         if longest is None or now - longest.owner.heard <= FORGET_S:
             self._full_until = now if longest is None else longest.owner.heard + FORGET_S
             return True
-        self._leave(longest, now, [])
+        self._leave(longest, now, facts)
+        longest.end(now, facts)  # no tick has found its silence where the daemon was stopped for so long
         self._forget(longest)
         return False
 

@@ -368,6 +368,17 @@ def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
     assert hub.owners == {}
 
 
+def test_a_contact_ends_before_its_sensor_gives_its_place_away() -> None:
+    """A daemon that was stopped for a minute is told of another sensor before it has looked who is silent."""
+    hand, hub = Hand(), Hub(replace(SCENE, max_sensors=1), Sure())
+    facts: list[object] = []
+    for t, packet, source in stream("arm", hand.idle(2.0) + hand.swipe("left")[:3], FIRST):
+        facts += hub.receive([(packet, source)], t)
+    facts += hub.receive([(floats("/other/pressure", hand.frame(), 0), SECOND)], 5.0 + FORGET_S)
+    told = [type(fact) for fact in facts if isinstance(fact, Onset | Cancelled | Release)]
+    assert told == [Onset, Cancelled, Release] and "other" in hub.sequences()
+
+
 def test_a_frame_that_says_nothing_is_cheap() -> None:
     """Counted in calls, which do not depend on the machine: an idle frame of a scene with nothing but a model."""
     assert statistics.median_low(idle_calls()) <= 35
