@@ -162,6 +162,20 @@ def test_strangers_cost_the_same_however_many_sensors_there_are() -> None:
     assert isinstance(new, Changed) and new.what == "new"
 
 
+@pytest.mark.parametrize("what", ["restart", "change"])
+def test_what_the_time_has_decided_is_said_though_nobody_looked_before_a_restart_or_another_scene(what: str) -> None:
+    hand, hub = Hand(), Hub(SCENE, Sure())
+    for t, packet, source in stream("arm", hand.idle(2.0) + hand.swipe("left"), FIRST):
+        hub.receive([(packet, source)], t)
+    while hub.due == math.inf:
+        t += 1 / 15
+        hub.receive([(floats("/arm/pressure", hand.frame(), 0), FIRST)], t)
+    now = hub.due + 0.01
+    deaf = replace(SCENE, thresholds={"swipe": 1.0, "double_tap": 1.0}, stale_s=2.0)
+    facts = hub.restart(["arm"], now) if what == "restart" else hub.change(deaf, Sure(), now)
+    assert [type(fact) for fact in facts if is_answer(fact)] == [Gesture]
+
+
 @pytest.mark.parametrize("rate_hz", [5.0, 12.0, 15.0, 45.0])
 def test_an_answer_comes_when_the_wait_is_over_and_waits_for_no_frame(rate_hz: float) -> None:
     hand, hub = Hand(), Hub(SCENE, Sure())
