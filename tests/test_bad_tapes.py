@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gestured.control.cli import main
+from gestured.core.errors import RecordingError
 from gestured.core.facts import Dropped
 from gestured.record import tape_reader
 from gestured.record.replay import Mute, Replay, maker, opened
@@ -94,6 +95,13 @@ def test_a_packet_that_cannot_be_sent_is_one_sentence(tmp_path: Path, capsys, pa
     assert main(["replay", str(path), "--to", str(free_address())]) == 1
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and said in err
+
+
+def test_two_tapes_in_one_file_are_not_played_as_the_first_alone(tmp_path: Path) -> None:
+    tape = write(tmp_path / "a.mcap", CHANNELS, message(1, 10**9, b""))
+    (tmp_path / "b.mcap").write_bytes(2 * tape.read_bytes())
+    with pytest.raises(RecordingError, match=r"b\.mcap: goes on behind its end, expected one recording"):
+        tape_reader.read(tmp_path / "b.mcap")
 
 
 @pytest.mark.parametrize("number", [1, 3], ids=["packets", "pictures"])

@@ -28,6 +28,8 @@ def read(path: str | Path) -> Tape:
             budget = Budget(file)
             for record in records(file, budget):
                 reading.take(record, budget)
+            if file.read(1):
+                raise _Wrong("goes on behind its end, expected one recording; another one is a file of its own")
     except CutOff:
         whole = False
     except Damaged as error:
