@@ -16,7 +16,6 @@ from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
 from gestured.core.idle import QUIETER
-from gestured.core.mounting import Mounting
 from gestured.core.window import Window
 from gestured.model.features import touch_pattern
 from tests.scenario import contacts
@@ -111,33 +110,6 @@ def follow_rules(events: list[Found]) -> None:
     for number in range(len(events) // 3):
         onset, answer, release = events[3 * number : 3 * number + 3]
         assert isinstance(onset, Opened) and isinstance(answer, Cut | Void) and isinstance(release, Ended)
-
-
-# --- mounting
-
-grids = st.tuples(st.integers(2, 64), st.integers(2, 64))
-turns = st.sampled_from([0, 90, 180, 270])
-mountings = st.builds(Mounting, turns, st.booleans())
-
-
-@settings(max_examples=20, deadline=None)
-@given(mountings, st.sampled_from([(9, 9), (6, 11), (12, 5)]), st.data())
-def test_a_mounted_sensor_gives_segments_as_a_person_sees_them(
-    mounting: Mounting, shape: Shape, data: st.DataObject
-) -> None:
-    rows, columns = shape
-    row, column = data.draw(st.integers(1, rows - 2)), data.draw(st.integers(1, columns - 2))
-    times, frames = stream(shape, [quiet(1.5), tap(shape, at=(row, column)), quiet(1)])
-    front_end = FrontEnd(rows, columns, mounting=mounting)
-    events = []
-    for t, frame in zip(times, frames, strict=True):
-        events += contacts(front_end, Frame(float(t), frame))
-    (segment,) = segments(events)
-    frame = segment.frames[segment.first]
-    assert frame.shape == mounting.shape(rows, columns) == (front_end.rows, front_end.columns)
-    marked = np.zeros(shape)
-    marked[row, column] = 1.0
-    assert frame.argmax() == mounting.frame(marked).argmax()
 
 
 # --- levels
@@ -278,6 +250,7 @@ def test_time_must_go_on(t: float) -> None:
 # --- any grid, any rate
 
 RATES = (5.0, 8.0, 12.5, 14.3, 15.0, 30.0, 60.0, 120.0, 250.0, 500.0, 1000.0)
+grids = st.tuples(st.integers(2, 64), st.integers(2, 64))
 # Large and fast at once costs seconds here; the corners have a test of their own.
 sensors = st.tuples(grids, st.sampled_from(RATES)).filter(lambda x: x[0][0] * x[0][1] * x[1] < 60_000)
 
