@@ -133,22 +133,9 @@ def test_every_taxel_may_rest_at_a_level_of_its_own(seed: int, other: int, sprea
         assert two.noise == pytest.approx(one.noise, rel=1e-3)
 
 
-@settings(max_examples=20, deadline=None)
-@given(seeds, st.floats(-3, 3), st.sampled_from([np.float32, np.float64]))
-def test_the_gain_decides_nothing(seed: int, exponent: float, kind: type[np.floating]) -> None:
-    gain = 10**exponent
-    times, frames = stream(SHAPE, GESTURES, seed=seed)
-    _, events = heard(times, frames)
-    _, scaled = heard(times, (frames * gain).astype(kind))
-    assert told(scaled) == told(events)
-    for one, two in zip(segments(events), segments(scaled), strict=True):
-        assert np.allclose(one.frames * gain, two.frames, atol=gain * 1e-2)
-        assert two.noise == pytest.approx(one.noise * gain, rel=1e-2)
-
-
-@pytest.mark.parametrize("scale", [1e-30, 1e-20, 1e20, 1e30])
+@pytest.mark.parametrize("scale", [1e-30, 1e-20, 1e-3, 7.0, 1e20, 1e30])
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_extreme_units_neither_overflow_nor_underflow(scale: float, kind: type[np.floating]) -> None:
+def test_the_unit_decides_nothing_and_neither_overflows_nor_underflows(scale: float, kind: type[np.floating]) -> None:
     times, frames = stream(SHAPE, GESTURES)
     _, events = heard(times, frames)
     window = Window(9, 9, 15.0, 1, 1 / 15, 1 / 15, 4.0)
@@ -558,24 +545,6 @@ def test_a_restart_with_another_baseline_at_any_moment(moment: float, level: flo
     events = play(front_end, more + times[-1] + 0.01, again)
     assert kinds(events) == ONE
     assert segments(events)[0].frames.max() > 0.8 * GAIN
-
-
-@pytest.mark.parametrize("when", ["idle", "in mid-gesture"])
-def test_a_reset_cancels_what_is_open_and_learns_anew(when: str) -> None:
-    times, frames = stream(SHAPE, [quiet(1.6), swipe(SHAPE, column=4)])
-    stop = len(times) if when == "in mid-gesture" else int(np.searchsorted(times, 1.5))
-    front_end, events = heard(times[:stop], frames[:stop])
-    rest = front_end.reset()
-    if when == "in mid-gesture":
-        assert kinds(events) == [Opened]
-        cancelled, release = rest
-        assert isinstance(cancelled, Void) and cancelled.reason == "restart"
-        assert isinstance(release, Ended)
-    else:
-        assert events == rest == []
-    assert not front_end.ready and not front_end.touched
-    more, again = stream(SHAPE, [quiet(1.2), tap(SHAPE), quiet(1)], level=700, seed=1)
-    assert kinds(play(front_end, more + 10, again)) == ONE
 
 
 @settings(max_examples=30, deadline=None)

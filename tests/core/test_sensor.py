@@ -504,7 +504,7 @@ def test_a_reset_cancels_what_is_open_and_starts_clean(what: str) -> None:
     ids = {kind: [e.id for e in events if isinstance(e, kind)] for kind in (Onset, Cancelled, Release)}
     assert ids[Onset] == ids[Cancelled] == ids[Release]
     assert not subject.front_end.ready and not subject.front_end.touched
-    later = [replace(frame, t=frame.t + 20) for frame in SWIPED]
+    later = [replace(frame, t=frame.t + 20, values=frame.values + 400) for frame in SWIPED]  # it is learned anew
     onset, gesture, release = run(subject, later)
     assert isinstance(gesture, Gesture) and gesture.sequence == 1
     assert onset.id == gesture.id == release.id == len(ids[Onset]) + 1  # type: ignore[union-attr]
