@@ -214,13 +214,6 @@ def test_counts_that_fall_under_pressure_are_turned_round(model: Path):
     assert found[1].gesture == "swipe_left" and not stroke(gestured.open(model, invert=True), Hand().swipe("left"))
 
 
-def test_a_threshold_is_the_confidence_from_which_an_answer_is_given(model: Path):
-    (answer,) = [e for e in stroke(gestured.open(model), Hand().swipe("left")) if isinstance(e, gestured.Gesture)]
-    strict = gestured.open(model, thresholds={"swipe_left": 1.0, "one_tap": 0.0})
-    (unknown,) = [e for e in stroke(strict, Hand().swipe("left")) if isinstance(e, gestured.Unknown)]
-    assert answer.confidence == unknown.confidence < 1 and unknown.reason == "confidence"
-
-
 def test_own_gestures_are_recognised_from_their_file(tmp_path: Path, model: Path):
     """A file as a daemon writes it: enrolled there, recognised here."""
     slash = [Hand().frame(1.0 + k, 1.0 + k) for k in range(7)]

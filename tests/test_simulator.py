@@ -126,19 +126,6 @@ def test_the_ten_are_the_contract_s() -> None:
 
 
 @pytest.mark.parametrize("kind", DIRECTIONS)
-def test_fingers_of_a_swipe_go_where_it_says(kind: str) -> None:
-    dx, dy = DIRECTIONS[kind]
-    for seed in PEOPLE:
-        for contact in performed(kind, seed, ("slow", "normal", "fast")[seed % 3]).contacts:
-            if not contact.finger:
-                continue
-            way = contact.x[-1] - contact.x[0], contact.y[-1] - contact.y[0]
-            along, across = way[0] * dx + way[1] * dy, way[0] * dy - way[1] * dx
-            assert along > 8.0
-            assert abs(across) < along
-
-
-@pytest.mark.parametrize("kind", DIRECTIONS)
 def test_pressure_and_reported_fingers_go_where_the_swipe_says(kind: str) -> None:
     dx, dy = DIRECTIONS[kind]
     for seed in PEOPLE:

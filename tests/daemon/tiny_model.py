@@ -11,12 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.simulator import GESTURES as GESTURES  # the tests have them from here
 from tests.daemon.trust import MAKER
 
-GESTURES = (
-    "one_tap", "double_tap", "swipe_down", "swipe_up", "swipe_right", "swipe_left", "circle_clockwise",
-    "circle_counter_clockwise", "swipe_up_two_fingers", "swipe_down_two_fingers",
-)  # fmt: skip
 ROWS = COLUMNS = 9
 PROVISIONAL = '{"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [null, 0.9], "tap": 0.8}'
 
