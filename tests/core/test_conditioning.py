@@ -16,8 +16,6 @@ from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
 from gestured.core.idle import QUIETER
-from gestured.core.window import Window
-from gestured.model.features import touch_pattern
 from tests.scenario import contacts
 
 Array = NDArray[np.float64]
@@ -138,15 +136,12 @@ def test_every_taxel_may_rest_at_a_level_of_its_own(seed: int, other: int, sprea
 def test_the_unit_decides_nothing_and_neither_overflows_nor_underflows(scale: float, kind: type[np.floating]) -> None:
     times, frames = stream(SHAPE, GESTURES)
     _, events = heard(times, frames)
-    window = Window(9, 9, 15.0, 1, 1 / 15, 1 / 15, 4.0)
     with np.errstate(all="raise"), warnings.catch_warnings():
         warnings.simplefilter("error")
         _, scaled = heard(times, (frames * scale).astype(kind))
-        assert told(scaled) == told(events)
-        for one, two in zip(segments(events), segments(scaled), strict=True):
-            prepared = window.apply(two)
-            assert np.allclose(prepared, window.apply(one), atol=1e-3)
-            assert np.isfinite(touch_pattern(prepared, 15.0)).all()
+    assert told(scaled) == told(events)
+    for one, two in zip(segments(events), segments(scaled), strict=True):
+        assert np.allclose(one.frames * scale, two.frames, atol=scale * 1e-2)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.int32, np.float16, np.float32])
@@ -389,17 +384,6 @@ def test_a_taxel_that_works_again_is_used_again(kind: str) -> None:
     assert segments(events)[-1].frames[:, 4, 4].max() > 0.9 * GAIN  # its own peak, which its neighbours do not reach
 
 
-def test_a_noisy_taxel_that_calms_down_is_used_again() -> None:
-    times, frames = stream(SHAPE, [quiet(120)])
-    calm = times >= 3
-    frames = np.where(calm[:, None, None], frames, faulty(frames, "noisy", (4, 4)))
-    front_end = FrontEnd(*SHAPE)
-    play(front_end, times[~calm], frames[~calm])
-    assert front_end.bad_taxels == 1
-    assert play(front_end, times[calm], frames[calm]) == []
-    assert front_end.bad_taxels == 0
-
-
 def test_a_taxel_that_becomes_noisy_does_not_end_the_service() -> None:
     """It is found within a minute, whatever it did until then."""
     times, frames = stream(SHAPE, [quiet(70), swipe(SHAPE, row=4), quiet(1)])
@@ -465,16 +449,6 @@ def test_a_hand_at_the_start_is_no_baseline_for_ever(
     events = play(front_end, times[~gone], frames[~gone])
     assert kinds(events) == ONE
     assert segments(events)[0].frames.max() > 0.8 * GAIN * np.exp(-0.5 / (2 * 0.9**2))
-
-
-@pytest.mark.parametrize("shape", [(9, 9), (2, 2), (27, 15)])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_half_of_the_full_scale_in_ten_minutes_is_followed(shape: Shape, sign: float) -> None:
-    times, frames = stream(shape, [quiet(600), tap(shape, 5.0), quiet(2)], rate=5.0, level=1000.0)
-    frames += sign * GAIN / 2 * (times / 600)[:, None, None]
-    front_end, events = heard(times, frames)
-    assert kinds(events) == ONE and 600 <= segments(events)[0].onset
-    assert front_end.bad_taxels == 0
 
 
 @pytest.mark.parametrize("faint", [0.025, 0.03, 0.04])

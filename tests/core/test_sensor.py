@@ -458,13 +458,6 @@ def test_a_classifier_that_is_replaced_while_a_second_tap_is_waited_for_is_asked
     assert [(type(event), event.gesture) for event in events] == [(Gesture, "zigzag")]  # type: ignore[union-attr]
 
 
-def test_another_classifier_may_know_other_gestures() -> None:
-    subject = recognizer(Fake())
-    reload(subject, Fake([says(0.2, 0.8)], gestures=("double_tap", "zigzag")))
-    (answer,) = answers(run(subject, SWIPED))
-    assert isinstance(answer, Gesture) and answer.gesture == "zigzag"
-
-
 # --- flush and reset
 
 OPEN = {
@@ -577,35 +570,3 @@ def test_a_silence_means_the_same_however_long_it_was(what: str, answer: str, si
     for frame in stream:
         front_end.push(frame)
     assert kinds(contacts(front_end, Frame(stream[-1].t + silence, idle))) == [answer, "Ended"]
-
-
-def fast(rate: float) -> list[Frame]:
-    """A tap, and shortly after it a swipe of two fingers that land 15 ms apart."""
-    shape = (np.arange(9)[:, None], np.arange(9))
-    rng = np.random.default_rng(0)
-
-    def blob(row: float, column: float) -> np.ndarray:
-        return 600 * np.exp(-((shape[0] - row) ** 2 + (shape[1] - column) ** 2) / 1.6)
-
-    found = []
-    for n in range(int(3.5 * rate)):
-        t = n / rate
-        values = 300 + rng.normal(0, 2, (9, 9))
-        if 1.5 <= t < 1.63:
-            values += blob(4, 4)
-        elif 1.83 <= t < 1.845:
-            values += blob(7, 2)
-        elif 1.845 <= t < 2.145:
-            row = 7 - 5 * (t - 1.845) / 0.3
-            values += np.maximum(blob(row, 2), blob(row, 6))
-        found.append(Frame(t, np.rint(values)))
-    return found
-
-
-@pytest.mark.parametrize("rate", [15.0, 30.0, 200.0, 1000.0])
-def test_a_tap_before_a_swipe_is_a_segment_of_its_own(rate: float) -> None:
-    front_end = FrontEnd(9, 9)
-    events = [event for frame in fast(rate) for event in contacts(front_end, frame)]
-    assert kinds(events) == ["Opened", "Cut", "Ended"] * 2
-    tap, swipe = (event.segment for event in events if isinstance(event, Cut))
-    assert 1.5 <= tap.onset <= tap.offset < 1.63 and 1.83 <= swipe.onset <= swipe.offset < 2.145
