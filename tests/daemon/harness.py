@@ -296,11 +296,6 @@ def blob(dtype: str) -> Encode:
     return encode
 
 
-def counted_blob(address: str, frame: Frame, count: int) -> bytes:
-    """A frame counter, and a blob of uint16."""
-    return encoding.message(address, "ib", (count, frame.astype(">u2").tobytes()))
-
-
 def lines_of(text: str) -> Iterator[Line]:
     """The JSON lines of a log."""
     return (json.loads(line) for line in text.splitlines() if line.startswith("{"))

@@ -46,23 +46,6 @@ def test_an_answer_waits_for_no_frame(shared: Daemon) -> None:
     assert event["decided"] - event["offset"] == pytest.approx(1 / harness.RATE_HZ + 0.1, abs=1e-3)
 
 
-def test_all_forms_of_a_frame_give_the_same_events(shared: Daemon) -> None:
-    client = shared.client().subscribe("gesture", sensors=[])
-    forms = {
-        "floats": harness.floats, "ints": harness.ints, "counted": harness.counted,
-        "blob4": harness.blob(">f4"), "blob2": harness.blob(">u2"), "blob1": harness.blob("u1"),
-        "counted_blob": harness.counted_blob,
-    }  # fmt: skip
-    answers = []
-    for name, encode in forms.items():
-        client.subscribe("gesture", sensors=[name])
-        Sensor(shared, name, encode).begin().perform("right", "tap")
-        events = client.events("gesture", name, 2)
-        answers.append([(e["gesture"], e["confidence"], e["frames"], e["scores"]) for e in events])
-    assert [gesture for gesture, *_ in answers[0]] == ["swipe_right", "one_tap"]
-    assert all(answer == answers[0] for answer in answers)
-
-
 def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
     client = shared.client()
     sensor = Sensor(shared, "packed", harness.counted).begin()
