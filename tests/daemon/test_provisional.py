@@ -1,7 +1,7 @@
 """Provisional events of a real daemon: who is told what, before the answer and with it."""
 
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -148,35 +148,6 @@ def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
         assert plain.line()["provisional"] is None
 
 
-def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket) -> None:
-    to = f"osc://127.0.0.1:{udp.getsockname()[1]}"
-    daemon = start("--clock", "sensor", "--publish", to, "--publish-provisional", "true", model=early)
-
-    def heard(last: str) -> list[tuple[str, str, list[Any]]]:
-        """What is published of the sensor, with its types and arguments, until that."""
-        found: list[tuple[str, str, list[Any]]] = []
-        while not found or found[-1][0] != last:
-            message = OscMessage(udp.recv(9999))
-            if message.address not in ("/gestured/status", "/gestured/arm/where"):
-                types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
-                found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
-        return found
-
-    found: list[tuple[str, str, list[Any]]] = []
-    sensor = Sensor(daemon, "arm").begin()
-    hand = sensor.hand
-    for begin in ([hand.swipe("left")], [hand.tap(), hand.idle(0.2), hand.tap()]):
-        sensor.send(*begin)
-        found += heard("provisional")
-        sensor.send(hand.idle(1.0))
-        found += heard("gesture")
-    assert [(what, types, params[0]) for what, types, params in found] == [
-        ("provisional", ",sfi", "swipe_left"), ("gesture", ",sfidd", "swipe_left"),
-        ("provisional", ",sfi", "one_tap"), ("revoked", ",si", "one_tap"), ("gesture", ",sfidd", "double_tap"),
-    ]  # fmt: skip
-    assert [found[n][2][-1] for n in (0, 2, 3)] == [1, 2, 2] and 0.9 <= found[0][2][1] <= 1
-
-
 @pytest.mark.parametrize("goes_on", [True, False])
 def test_what_was_said_over_osc_is_revoked_across_a_reload(start, early: Path, udp: socket.socket, goes_on) -> None:
     config = early.with_suffix(".toml")
@@ -198,13 +169,17 @@ def test_what_was_said_over_osc_is_revoked_across_a_reload(start, early: Path, u
     assert [heard() for _ in range(2)] == [("revoked", ["one_tap"]), ("gesture", ["double_tap"])]
 
 
-def test_without_the_setting_osc_says_only_what_it_said_before(udp: socket.socket) -> None:
-    for wanted, first in ((False, "gesture"), (True, "provisional")):
-        sink = OscSink(Address(*udp.getsockname()), Metrics(), provisional=wanted)
-        sink.publish(Provisional("arm", 1, "one_tap", 0.9, 0.0, 0.1), 0.0)
-        sink.publish(Gesture("arm", 1, "double_tap", 0.9, 1, 0.0, 1.0, 2.0, 3, 0, "tiny", False, {}, "revoked"), 0.0)
-        sink.close()
-        assert OscMessage(udp.recv(9999)).address == f"/gestured/arm/{first}"
+@pytest.mark.parametrize("wanted", [True, False])
+def test_over_osc_it_is_said_and_revoked_where_the_setting_has_it(udp: socket.socket, wanted: bool) -> None:
+    sink = OscSink(Address(*udp.getsockname()), Metrics(), provisional=wanted)
+    sink.publish(Provisional("arm", 7, "one_tap", 0.5, 0.0, 0.1), 0.0)
+    sink.publish(Gesture("arm", 7, "double_tap", 0.5, 3, 0.0, 1.0, 2.0, 3, 0, "tiny", False, {}, "revoked"), 0.0)
+    sink.close()
+    early = [("provisional", ",sfi", ["one_tap", 0.5, 7]), ("revoked", ",si", ["one_tap", 7])]
+    for what, types, params in (*early * wanted, ("gesture", ",sfidd", ["double_tap", 0.5, 3, 0.0, 1.0])):
+        message = OscMessage(udp.recv(9999))
+        told = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
+        assert (message.address, told, message.params) == (f"/gestured/arm/{what}", types, params)
 
 
 def test_in_a_process_of_ones_own(early: Path) -> None:
