@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.classifier import Classifier, Scores
 from gestured.core.events import Event
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
@@ -37,19 +36,11 @@ from gestured.simulator import (
     gesture_take,
     session,
 )
+from tests.core.test_sensor import Fake
 
 
 def take_of(kind: str, person: int = 70) -> Take:
     return gesture_take(kind, Participant(person), SimulatedSensor.nominal(day=person), generator(person, 3))
-
-
-class Sure(Classifier):
-    """A classifier that knows one gesture, and sees it everywhere."""
-
-    gestures = ("one_tap", "double_tap")
-
-    def classify(self, segment: Segment) -> Scores:
-        return Scores(np.ones(2, np.float32), 0.0, "sure")
 
 
 def decided(found: list[Event | Decided]) -> list[Segment]:
@@ -59,7 +50,7 @@ def decided(found: list[Event | Decided]) -> list[Segment]:
 def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None:
     take = session(Participant(71), SimulatedSensor.nominal(day=71), generator(71, 4), 40.0)
     heard: list[Segment] = []
-    sure = Sure()
+    sure = Fake()
     sensor = Sensor("armrest", Scene(sure.gestures, take.frames.shape[1:]), sure)
     for t, values in zip(take.times, take.frames, strict=True):
         heard += decided(sensor.push(Frame(float(t), values)))

@@ -80,18 +80,6 @@ def segment() -> Segment:
     return Segment(values, np.arange(8) / 15.0, 1, 6, 1.0)
 
 
-@pytest.mark.parametrize("batch", [1, 3])
-@pytest.mark.parametrize("length", [1, 2, 37, 200])
-def test_file_equals_torch(net: tuple[Net, Path], batch: int, length: int) -> None:
-    module, path = net
-    frames = np.random.default_rng(length).random((batch, length, 9, 9), np.float32) ** 4
-    scores, unknown = open_model(path).run(frames)
-    with torch.no_grad():
-        expected = module(torch.from_numpy(frames))
-    np.testing.assert_allclose(scores, expected[0].numpy(), atol=1e-4)
-    np.testing.assert_allclose(unknown, expected[1].numpy(), atol=1e-4)
-
-
 def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path]) -> None:
     module, path = net
     model = open_model(path)

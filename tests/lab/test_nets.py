@@ -38,15 +38,6 @@ def test_what_follows_a_gesture_changes_no_logit(nets: nn.ModuleDict, name: str,
 
 
 @pytest.mark.parametrize("name", NETS)
-def test_a_window_is_answered_alike_alone_and_among_others(nets: nn.ModuleDict, name: str) -> None:
-    x = nn.utils.rnn.pad_sequence([torch.from_numpy(f) for f in MADE.values()], batch_first=True)
-    with torch.no_grad():
-        together = nets[name](x)
-        alone = torch.cat([nets[name](torch.from_numpy(f)[None]) for f in MADE.values()])
-    torch.testing.assert_close(together, alone, atol=1e-5, rtol=1e-5)
-
-
-@pytest.mark.parametrize("name", NETS)
 def test_a_gesture_that_goes_on_is_told_from_one_that_is_over(nets: nn.ModuleDict, name: str) -> None:
     with torch.no_grad():
         for frames in map(torch.from_numpy, MADE.values()):
