@@ -179,7 +179,7 @@ class Hub:
 
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
         """Learn these sensors anew; their open contacts are cancelled. KeyError for one that is not there."""
-        facts: list[Fact] = []
+        facts = self.wait(now)  # a contact that is over is answered first
         self._out(now, facts)
         for name in sensors:
             self._sensors[name].restart(now, facts)
@@ -187,7 +187,7 @@ class Hub:
 
     def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
         """Go on in another scene; what was learned of a sensor stays where it holds. ValueError as for a new hub."""
-        facts: list[Fact] = []
+        facts = self.wait(now)  # what is over is answered as the scene before decides
         self._set(scene, classifier)
         for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)
@@ -386,7 +386,7 @@ class Hub:
             self._full_until = now if longest is None else longest.owner.heard + FORGET_S
             return True
         self._leave(longest, now, facts)
-        longest.end(now, facts)  # no tick has found its silence where the daemon was stopped for so long
+        longest.end(now, facts)  # its contact is open if no tick came in its silence, as where the process was stopped
         self._forget(longest)
         return False
 

@@ -335,15 +335,13 @@ class Sensor:
         self._run(self.flush, now, facts)
 
     def restart(self, now: float, facts: list[Fact]) -> None:
-        """Learn the sensor anew; a contact that is open is cancelled, unless the time has decided it until then."""
-        self.elapse(now, facts)
+        """Learn the sensor anew; a contact that is open is cancelled."""
         self.vitals.restart()
         self._fresh = True
         self.run(Sensor.reset, now, facts)
 
     def change(self, scene: Scene, classifier: Classifier, now: float, facts: list[Fact]) -> None:
-        """Go on in another scene; what was learned stays where it still holds, and what was over is the old one's."""
-        self.elapse(now, facts)
+        """Go on in another scene; what was learned stays where it still holds."""
         before, self._scene = self._scene, scene
         old, new = self.front_end, _front_end(self.name, scene)
         another_clock = scene.clock_of(self.name) != before.clock_of(self.name)
