@@ -100,7 +100,7 @@ def test_a_packet_that_cannot_be_sent_is_one_sentence(tmp_path: Path, capsys, pa
 def test_two_tapes_in_one_file_are_not_played_as_the_first_alone(tmp_path: Path) -> None:
     tape = write(tmp_path / "a.mcap", CHANNELS, message(1, 10**9, b""))
     (tmp_path / "b.mcap").write_bytes(2 * tape.read_bytes())
-    with pytest.raises(RecordingError, match=r"b\.mcap: goes on behind its end, expected one recording"):
+    with pytest.raises(RecordingError, match=r"b\.mcap: holds more bytes after the end of its recording"):
         tape_reader.read(tmp_path / "b.mcap")
 
 

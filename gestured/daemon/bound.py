@@ -58,7 +58,7 @@ class Bound:
 
 
 def _from_anywhere(path: Path) -> str:
-    """The path itself, or where a relative one leads: without "..", since a socket's path has 107 bytes at most."""
+    """An absolute path as it is, a relative one as what it leads to: with its ".." it might exceed 107 bytes."""
     return str(path if path.is_absolute() else path.parent.resolve() / path.name)
 
 

@@ -29,7 +29,7 @@ def read(path: str | Path) -> Tape:
             for record in records(file, budget):
                 reading.take(record, budget)
             if file.read(1):
-                raise _Wrong("goes on behind its end, expected one recording; another one is a file of its own")
+                raise _Wrong("holds more bytes after the end of its recording, expected one recording in a file")
     except CutOff:
         whole = False
     except Damaged as error:

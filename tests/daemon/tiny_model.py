@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.simulator import GESTURES as GESTURES  # the tests have them from here
+from gestured.simulator import GESTURES as GESTURES  # tests name the small model's gestures as tiny_model.GESTURES
 from tests.daemon.trust import MAKER
 
 ROWS = COLUMNS = 9
