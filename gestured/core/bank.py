@@ -65,6 +65,7 @@ class Banks:
     def __init__(self) -> None:
         self._banks: dict[tuple[int, ...], Bank] = {}
         self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: in which of them it is
+        self.doubted: set[str] = set()  # sensors, in banks or not, whose next frame may come after lost ones
 
     def enter(self, sensor: Sensor) -> None:
         """Move what is known of a sensor into a bank, if it is calm and its last frame came in its turn."""
@@ -117,7 +118,7 @@ class Banks:
             waits = np.ones(len(block.packets), np.bool_)
             for bank in self._banks.values():
                 try:
-                    for taken in bank.take(block, sources, others, now):
+                    for taken in bank.take(block, sources, others, self.doubted, now):
                         arrived += map(block.sensors.__getitem__, taken)
                         waits[taken] = False
                 except Exception as error:  # a bug: what was not taken until then is taken one by one
@@ -173,6 +174,8 @@ class Bank:
         for table, values in zip(self._taxels, (idle.counts, idle.sigma, weight, idle.compared, sent), strict=True):
             table[row] = values
         self._when[row] = -math.inf
+        if steps := stamper.intervals:
+            self._when[row, -len(steps) :, 2] = steps
         self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
         if front.segmenter.after.recovering(self._known["last"][row]):
             self._recover[row] = front.segmenter.after
@@ -205,6 +208,7 @@ class Bank:
             ring[row, np.arange(int(count), int(count) + ring.shape[1]) % ring.shape[1]]
             for ring in (self._when, self._above)
         )
+        stamper.intervals.clear()
         stamper.intervals.extend(step for _, _, step in when.tolist() if step > 0)
         for higher, (t, since, _) in zip(above, when[-len(above) :].tolist(), strict=True):
             if t > -math.inf:
@@ -233,7 +237,9 @@ class Bank:
         """All sensors were reviewed: jitter is told by their intervals as they are now."""
         self._known["expected"] = self._known["interval"]
 
-    def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
+    def take(
+        self, block: Block, sources: Sequence[Source], others: set[str], doubted: set[str], now: float
+    ) -> Iterator[list[int]]:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
         if block.values.shape[1:] != self._front.grid_sent:
             return
@@ -256,7 +262,11 @@ class Bank:
             first.fill(-1)
             first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
             turn = first[first >= 0]
-            taken = turn[self._take(block, turn, rows[turn], now)]
+            doubts = np.array([block.sensors[n] in doubted for n in turn.tolist()]) if doubted else None
+            taken = turn[self._take(block, turn, rows[turn], doubts, now)]
+            for name in doubted.intersection(map(block.sensors.__getitem__, taken.tolist())) if doubted else ():
+                doubted.remove(name)
+                self._sensors[name].vitals.stretches = 0  # see `Vitals.arrived`
             yield taken.tolist()
             left = left[first[rows[left]] != left]
             if len(left):
@@ -264,8 +274,13 @@ class Bank:
                 first[rows[taken]] = taken
                 left = left[first[rows[left]] >= 0]
 
-    def _take(self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], now: float) -> Mask:
-        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
+    def _take(
+        self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], doubts: Mask | None, now: float
+    ) -> Mask:
+        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did.
+
+        `doubts`: (n,) before which of them others may have been lost; None before none.
+        """
         front, known = self._front, _numbers(self._known).take(rows, axis=0)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
          usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
@@ -279,6 +294,8 @@ class Bank:
         taken &= np.isnan(counter) if block.counters is None else counter == block.counters[places]
         since = t - last
         taken &= (since >= self._least_s) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
+        if doubts is not None and block.counters is None:  # what fits into the pause is lost, see `Stamper.stamp`
+            taken &= ~doubts | (np.rint(since / self._usual(rows, count)) <= 1)
         sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
         raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.grid_sent))
 
@@ -338,6 +355,14 @@ class Bank:
         count += 1
         _numbers(self._known)[rows] = known[keep]
         return taken
+
+    def _usual(self, rows: NDArray[np.intp], count: Array) -> Array:
+        """(n,) s, the usual interval of n rows, of which so many frames were taken here; see `Stamper`."""
+        slots = (count.astype(np.intp)[:, np.newaxis] - 1 - np.arange(Stamper.RECENT)) % self._when.shape[1]
+        steps = self._when[rows[:, np.newaxis], slots, 2]
+        steps = np.sort(np.where(steps > 0, steps, math.inf), axis=1)
+        known = np.isfinite(steps).sum(axis=1)
+        return np.where(known > 0, steps[np.arange(len(rows)), known // 2], Stamper.PERIOD_S)
 
     def _taus(self, rows: NDArray[np.intp], t: Array) -> float | Array:
         """With which time constants the baselines follow until (n,) times `t`, in s; one number where all have it."""

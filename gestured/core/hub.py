@@ -42,9 +42,7 @@ class Hub:
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
         self._banks = bank.Banks()
-        self._missed = 0  # times that this machine had no room for a packet
-        self._missed_read = 0  # what `_missed` was when packets were read last
-        self._missed_before: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
+        self._missed = False  # whether this machine had no room for a packet since packets were read last
         # How many sensors each source owns that was heard within the last minute, as of the last tick.
         self.owners: Mapping[Source, int] = {}
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
@@ -63,17 +61,16 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
-        if self._missed_read != self._missed:  # how many packets each sensor has missed is seen by their frames alone
-            self._out(now, facts)
-            self._missed_read = self._missed
+        if self._missed:  # how many packets each sensor has missed is seen by their frames alone
+            self._banks.doubted, self._missed = set(self._sensors), False
         together = len(packets) >= bank.FEW
         waited: list[Sensor] = []
         for name, arrivals in self._read(packets, now, facts, together=together).items():
             sensor = self._sensors[name]
             if name in self._waits:
                 sensor.elapse(now, facts)
-            due = sensor.receive(arrivals, now, facts, missed=self._missed_before[name] != self._missed)
-            self._missed_before[name] = self._missed
+            due = sensor.receive(arrivals, now, facts, missed=name in self._banks.doubted)
+            self._banks.doubted.discard(name)
             if due < math.inf:
                 self._waits[name], self.due = sensor, min(self.due, due)
             if sensor.shown is not None:
@@ -175,7 +172,7 @@ class Hub:
 
     def missed(self) -> None:
         """This machine had no room for a packet. Each sensor's next frame shows whether it was one of that sensor's."""
-        self._missed += 1
+        self._missed = True
 
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
         """Learn these sensors anew; their open contacts are cancelled. KeyError for one that is not there."""
@@ -362,7 +359,6 @@ class Hub:
         sensor = self._sensors[name] = Sensor(name, self.scene, self._classifier, source, numbers)
         sensor.foresee(asked=self.foreseen(name), later=self._later)
         sensor.follow(facts, asked=self._follows(name))
-        self._missed_before[name] = self._missed
         facts.append(Changed(name, "new", source))
         sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
         return sensor
@@ -392,7 +388,8 @@ class Hub:
 
     def _forget(self, sensor: Sensor) -> None:
         """Give a sensor's place away. Should it return, its sequences and ids go on where they were."""
-        del self._sensors[sensor.name], self._missed_before[sensor.name]
+        del self._sensors[sensor.name]
+        self._banks.doubted.discard(sensor.name)
         self._waits.pop(sensor.name, None)
         self.asks.pop(sensor.name, None)
         self.looks.pop(sensor.name, None)

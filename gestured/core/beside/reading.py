@@ -77,12 +77,12 @@ class Vitals:
         # unknown), and how many they are so far.
         self.together = 0.0, math.inf, 0
         self._began = 0.0  # s, the first frame after the last silence
-        self._stretches = 0  # stretches in a row that were shorter than SHORT_S
+        self.stretches = 0  # stretches in a row that were shorter than SHORT_S
 
     @property
     def intermittent(self) -> bool:
         """Whether the sensor falls silent again and again, after a few seconds each time."""
-        return self._stretches >= STRETCHES and (self.last is None or self.last - self._began < SHORT_S)
+        return self.stretches >= STRETCHES and (self.last is None or self.last - self._began < SHORT_S)
 
     def arrived(self, now: float, frames: int, *, missed: bool) -> None:
         """`frames` came together at `now` s. Interarrival jitter as RTP has it.
@@ -91,7 +91,7 @@ class Vitals:
         the sensor's own, and short stretches are counted anew.
         """
         if missed:
-            self._stretches = 0
+            self.stretches = 0
         if self.last is None:
             self._began = now
         if now != self.last:
@@ -113,7 +113,7 @@ class Vitals:
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""
         if self.last is not None:
-            self._stretches = self._stretches + 1 if self.last - self._began < SHORT_S else 0
+            self.stretches = self.stretches + 1 if self.last - self._began < SHORT_S else 0
         self.last = None
 
     def restart(self) -> None:
