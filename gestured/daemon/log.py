@@ -104,9 +104,13 @@ _errors: LineWriter | None = None
 
 
 def print_log(line: str) -> None:
-    """Have a line written to standard error, where there is one."""
+    """Have a line written to standard error, where there is one; no more once the interpreter ends.
+
+    What is collected then may have something to say, but a thread that is started then never runs, and who starts it
+    waits for ever.
+    """
     global _errors
-    if sys.stderr is not None:
+    if sys.stderr is not None and not sys.is_finalizing():
         _errors = _errors or LineWriter(STDERR)
         _errors.put(line)
 

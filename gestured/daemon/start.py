@@ -50,10 +50,7 @@ async def _run(settings: Settings, load: Loader) -> None:
     _abort(signal.SIG_BLOCK)  # in threads that are made from here on: it reaches this one
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
     stop, reload = asyncio.Event(), asyncio.Event()
-    throttle = Throttle()
-    loop.set_exception_handler(
-        lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
-    )
+    loop.set_exception_handler(partial(report, Throttle()))
     _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
     served = threading.Event()
     _end_surely(loop, served)
@@ -75,6 +72,16 @@ async def _run(settings: Settings, load: Loader) -> None:
         bound.close()
         end_all()  # threads may wait for a model that is being opened, and the end waits for threads
     served.set()  # and for one that waits for a name of a host, or for a disk, it waits END_S in all
+
+
+def report(throttle: Throttle, _: asyncio.AbstractEventLoop, what: dict[str, Any]) -> None:
+    """Log what an event loop tells of an error that nobody handled.
+
+    A connection that was lost is no bug, though asyncio tells of it, too, where its streams are collected as garbage.
+    """
+    error = what.get("exception")
+    if not isinstance(error, ConnectionError):
+        throttle.error("a bug in a callback", what["message"], exc_info=error)
 
 
 def _abort(how: int) -> None:

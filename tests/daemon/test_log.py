@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from gestured.daemon import log
+from gestured.daemon import start as start_up
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
 
 
@@ -51,6 +52,29 @@ def test_a_daemon_whose_log_is_not_read_serves_and_ends(start, unread: int) -> N
     daemon.signal(signal.SIGTERM)
     assert daemon.wait() == 0
     assert os.get_blocking(unread)  # it is shared with others: whoever started the daemon finds it as it was
+
+
+def test_what_is_said_when_the_interpreter_ends_does_not_keep_it() -> None:
+    """No thread starts any more that could write it, such as of a connection that is collected as garbage then."""
+    code = """from gestured.daemon import log
+log.configure("info")
+class Left:
+    def __del__(self): say("too late")
+say, left = log.log.error, Left()
+say("ended")
+log.close()"""
+    ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, timeout=DEADLINE_S)
+    assert ended.returncode == 0 and ended.stderr.count("ended") == 1
+
+
+def test_a_connection_that_was_lost_is_no_bug(monkeypatch) -> None:
+    said: list[Exception] = []
+    told = staticmethod(lambda event, reason, count, exc_info: said.append(exc_info))
+    monkeypatch.setattr(log, "log", type("Log", (), {"exception": told}))
+    lost, bug = ConnectionResetError(104, "Connection reset by peer"), ValueError("x")
+    for error in (lost, bug):
+        start_up.report(log.Throttle(), None, {"message": "Future exception was never retrieved", "exception": error})
+    assert said == [bug]
 
 
 @pytest.mark.parametrize("unread", ["pipe"], indirect=True)

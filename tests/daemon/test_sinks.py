@@ -23,7 +23,7 @@ def test_a_destination_whose_name_is_not_known_yet_is_looked_up_again(
     found: list[Any] = [socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")] * 2 + [known]
 
     def look_up(*_: object) -> Any:
-        if isinstance(one := found.pop(0), OSError):
+        if isinstance(one := found.pop(0) if found else known, OSError):
             raise one
         return one
 
