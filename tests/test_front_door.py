@@ -160,9 +160,11 @@ def test_a_frame_may_say_what_the_sensor_knows_of_it(recognizer: Any):
     assert (onset.sensor, onset.id) == ("armrest", 1) and isinstance(onset, Onset)
 
 
-def test_a_broken_value_costs_its_frame_alone(recognizer: Any):
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("value", "kind"), [(np.nan, "f8"), (1e300, "f8"), (np.inf, "f4"), (np.inf, "f2")])
+def test_a_broken_value_costs_its_frame_alone(recognizer: Any, value: float, kind: str):
     """Before and after it all is as it would be without."""
-    broken = np.full((9, 9), np.nan)
+    broken = np.full((9, 9), value, kind)
     hand = Hand()
     events = [e for n, frame in enumerate(hand.idle(2.0)) for e in recognizer.push(n / 15, frame)]
     events += recognizer.push(2.01, broken) + recognizer.push(2.07, hand.frame(4.0))

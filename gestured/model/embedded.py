@@ -69,7 +69,7 @@ class Embedded:
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = seconds
-        if not np.all(np.abs(frame) <= LARGEST):  # written so that NaN fails it, too
+        if not np.all(np.abs(frame) <= np.float64(LARGEST)):  # so NaN fails it, and no float16 cuts the bound
             return []
         return events_of(self._sensor.push(Frame(seconds, frame, tuple(touches), lost)))
 
