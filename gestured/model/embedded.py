@@ -5,9 +5,9 @@ import logging
 import math
 import operator
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,15 @@ from gestured.model.ladder import (
 )
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
+
+_FLAG = (bool | np.bool_, "true or false")
+_NUMBER = (SupportsFloat, "a number of seconds")
+# What `open` takes, where nothing further on says it better.
+_TAKES: Mapping[str, tuple[Any, str]] = {
+    "model": (str | os.PathLike, "a name or a path"), "own_gestures": (str | os.PathLike | None, "a path"),
+    "gestures": (Collection | None, "a list of names"), "zones": (Mapping | None, "four numbers for each name"),
+    "tap_gap_s": _NUMBER, "arming.seconds": _NUMBER, "mirror": _FLAG, "invert": _FLAG, "provisional": _FLAG, "touch": _FLAG,
+}  # fmt: skip
 
 
 class Embedded:
@@ -156,6 +165,10 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
     OwnFileError for another mistake.
     """
+    given = locals() | {"arming.seconds": arming.get("seconds", 0) if isinstance(arming, Mapping) else 0}
+    for name, (kind, words) in _TAKES.items():
+        if not isinstance(given[name], kind):
+            raise SettingsError(f"{name}: expected {words}, found {given[name]!r}")
     if not isinstance(sensor, str) or not is_sensor(sensor):
         raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
@@ -209,7 +222,7 @@ def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float
         )
     require_gestures(ladder, (name for name in told if name not in ladder.own.gestures))
     for name, least in told.items():
-        if not isinstance(least, int | float) or not 0 <= least <= 1:
+        if isinstance(least, bool) or not isinstance(least, int | float) or not 0 <= least <= 1:
             raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")
     return told
 
