@@ -37,13 +37,12 @@ from gestured.model.ladder import (
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
-_FLAG = (bool | np.bool_, "true or false")
-_NUMBER = (SupportsFloat, "a number of seconds")
 # What `open` takes, where nothing further on says it better.
 _TAKES: Mapping[str, tuple[Any, str]] = {
     "model": (str | os.PathLike, "a name or a path"), "own_gestures": (str | os.PathLike | None, "a path"),
     "gestures": (Collection | None, "a list of names"), "zones": (Mapping | None, "four numbers for each name"),
-    "tap_gap_s": _NUMBER, "arming.seconds": _NUMBER, "mirror": _FLAG, "invert": _FLAG, "provisional": _FLAG, "touch": _FLAG,
+    **dict.fromkeys(("tap_gap_s", "arming.seconds"), (SupportsFloat, "a number of seconds")),
+    **dict.fromkeys(("mirror", "invert", "provisional", "touch"), (bool | np.bool_, "true or false")),
 }  # fmt: skip
 
 
