@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gestured.client.values import npz
 from gestured.lab.recordings.store import compact, join_recordings
 from gestured.record.arrays import write
 from gestured.record.check import SESSION, UNNAMED
@@ -49,7 +50,7 @@ def main() -> None:
     """Write one file of recordings."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    parser.add_argument("--out", type=Path, required=True, metavar="F.npz")
+    parser.add_argument("--out", type=npz, required=True, metavar="F.npz")
     args = parser.parse_args()
     write(args.out, join_recordings([session(path) for path in args.files]))
 

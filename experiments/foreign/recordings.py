@@ -6,12 +6,12 @@ Each take is another person at another sensor. What nobody can recognise is left
 """
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
 from experiments.foreign import GESTURES, LEVELS, take
 from experiments.foreign.judge import visible
+from gestured.client.values import npz
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 
@@ -35,7 +35,7 @@ def recordings(count: int, level: str = "nominal", first: int = 0) -> Recordings
 def main() -> None:
     """Write the file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz to write")
+    parser.add_argument("out", type=npz, metavar="OUT", help="the .npz to write")
     parser.add_argument("--n", type=int, default=20, help="takes of each gesture (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
     parser.add_argument("--level", choices=LEVELS, default="nominal")

@@ -2,6 +2,7 @@
 
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from gestured.client.address import named
 from gestured.core.address import Address, Grid, is_sensor
@@ -39,6 +40,13 @@ def sensor_name(text: str) -> str:
     if not is_sensor(text):
         raise ArgumentTypeError(f"{text!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
     return text
+
+
+def npz(text: str) -> Path:
+    """A file of recordings to write; `gestured-lab forget` finds it by its ending."""
+    if (path := Path(text)).suffix != ".npz":  # so no tape is replaced by its frames, either
+        raise ArgumentTypeError(f"{text!r}: expected a file *.npz")
+    return path
 
 
 def number(low: float, high: float, *, whole: bool = False) -> Callable[[str], float]:

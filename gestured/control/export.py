@@ -8,7 +8,8 @@ import numpy as np
 
 from gestured.client.program import Commands
 from gestured.client.say import tell
-from gestured.core.errors import GesturedError, RecordingError
+from gestured.client.values import npz
+from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
@@ -27,7 +28,7 @@ def add(commands: Commands) -> None:
         epilog="example:\n  gesturectl export drive.mcap drive.npz --sensor armrest",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
-    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz to write")
+    parser.add_argument("out", type=npz, metavar="OUT", help="the .npz to write")
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
     parser.set_defaults(run=run)
@@ -35,8 +36,6 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Decode, stamp and write."""
-    if args.out.suffix != ".npz":  # else a slip, as to name the recording twice, puts frames into a tape's place
-        raise GesturedError(f"{args.out}: expected a file *.npz")
     names, made = sessions_of(args.file, args.sensor)
     recording.write(args.out, made)
     summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}

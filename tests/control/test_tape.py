@@ -149,7 +149,8 @@ def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path:
     status, _, err = run("export", path, tmp_path / "x.npz", "--sensor", "nobody")
     assert status == 1 and "nobody" in err and not (tmp_path / "x.npz").exists()
     before = path.read_bytes()
-    assert run("export", path, path) == (1, "", f"gesturectl: {path}: expected a file *.npz\n")
+    status, _, err = run("export", path, path)
+    assert status == 2 and f"OUT: '{path}': expected a file *.npz\n" in err
     assert path.read_bytes() == before
 
 

@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 
 from gestured.client.pad.server import DEFAULT
-from gestured.client.values import bind_address, host_port, number, rows_by_columns, sensor_name, some_of
+from gestured.client.values import bind_address, host_port, npz, number, rows_by_columns, sensor_name, some_of
 from gestured.core.address import Address
 from gestured.core.own import is_name
 from gestured.lab.recordings.protocol import pseudonym
@@ -57,7 +57,7 @@ def add_recordings(command: Add) -> None:
     bring.formatter_class = argparse.RawDescriptionHelpFormatter
     bring.description = IMPORT
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")
-    bring.add_argument("--out", type=Path, required=True, metavar="F.npz", help="a new file for all of them")
+    bring.add_argument("--out", type=npz, required=True, metavar="F.npz", help="a new file for all of them")
     bring.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (9x9)")
     bring.add_argument("--time-unit", choices=("s", "ms", "us"), default="s", help="of the first column (s)")
     bring.add_argument("--label", type=_label, default=SESSION, metavar="LABEL",

@@ -103,7 +103,9 @@ def test_where_nothing_is_good_nothing_is_written(tmp_path: Path, capsys: pytest
     assert out.read_text() == "somebody's"
 
 
-@pytest.mark.parametrize("flags", [("--participant", "Anna Meier"), ("--label", "swipe_lft"), ("--consent", "May")])
+@pytest.mark.parametrize(
+    "flags", [("--participant", "Anna Meier"), ("--label", "swipe_lft"), ("--consent", "May"), ("--out", "b")]
+)
 def test_flags_are_checked(flags: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["import", "--participant", "07", "a.csv", "--out", str(tmp_path / "b.npz"), *flags])
