@@ -177,7 +177,8 @@ STREAMS: dict[str, Callable[[int, int], list[Sample]]] = {
 
 
 def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
-    """What is made of each number, in order, by so many processes; an interruption ends all of them."""
+    """What is made of each number, in order, by so many processes at most; an interruption ends all of them."""
+    jobs = min(jobs, len(todo) or 1)
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         yield from progress(pool.imap(make, todo, chunksize=max(1, min(50, len(todo) // (4 * jobs)))), len(todo), title)
 

@@ -20,6 +20,7 @@ from gestured.lab.dataset import (
     Truth,
     cuts,
     from_take,
+    in_processes,
     matched,
     recorded,
     simulated,
@@ -149,6 +150,11 @@ def test_a_day_is_the_same_in_another_process(tmp_path: Path, monkeypatch: pytes
     """Also one on any sensor, which is drawn apart from the day."""
     monkeypatch.setitem(STREAMS, "short", short_day)
     same(simulated(tmp_path, "short", 4, 1, jobs=1), collect(short_day(4, 0)))
+
+
+def test_no_more_processes_start_than_there_are_pieces_of_work() -> None:
+    made = in_processes(abs, range(2), 5, "")
+    assert (next(made), len(multiprocessing.active_children())) == (0, 2)
 
 
 class Broken:
