@@ -1,6 +1,7 @@
 """`gestured-lab`: train, evaluate and measure. Needs the extra [lab] (torch, scikit-learn, onnx)."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -20,6 +21,7 @@ from gestured.lab.recordings.flags import add_recordings
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
+FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",
@@ -171,6 +173,9 @@ def _check(args: argparse.Namespace) -> None:
         raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
     if getattr(args, "real", None) is not None and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
+    file = getattr(args, flag := FILES.get(args.command, ""), None)
+    if file and not (os.access(file.parent, os.W_OK) and (file.is_file() or not file.exists())):
+        raise GesturedError(f"--{flag}: expected a file in a folder that can be written to, found {file}")
 
 
 if __name__ == "__main__":

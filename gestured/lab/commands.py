@@ -10,6 +10,7 @@ import torch
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import write_manifest
+from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.opening import open_model
@@ -18,6 +19,9 @@ from gestured.model.shipped import LADDER
 
 def run(args: argparse.Namespace) -> int:
     """Either of the two; a folder that cannot be made is told of now, and not after half an hour."""
+    if args.command == "evaluate" and args.document:
+        require_marks("figures", args.document[0])
+        require_marks("worst", *args.document[1:])
     args.cache.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(args.jobs)
     plan = TrainingPlan.quick() if args.quick else TrainingPlan()

@@ -85,6 +85,13 @@ def renew(document: Path, name: str, lines: Iterable[str]) -> None:
     document.write_text(text[: text.index(begin)] + block + text[text.index(end) + len(end) :])
 
 
+def require_marks(name: str, *pages: Path | None) -> None:
+    """GesturedError, before what takes hours, for a page without the marks that `renew` needs; None is no page."""
+    for page in pages:
+        if page is not None and not kept(page, name):
+            raise GesturedError(f"--document: expected a page with the marks of `{name}`, found none in {page}")
+
+
 def signed(lines: list[str]) -> list[str]:
     """The lines of a block; the one that says what they were made of has the digest of the others."""
     at = next((n for n, line in enumerate(lines) if LINE.fullmatch(line)), None)

@@ -84,6 +84,14 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
         *((f"{command} --jobs 0", "--jobs: expected 1 or more, found 0")
           for command in ("train", "evaluate", "study")),
         *((f"{command} --real nowhere", "--real: nowhere is no folder") for command in ("train", "evaluate", "study")),
+        *((f"{line} nowhere/file.{end}", f"{line.split()[-1]}: expected a file in a folder that can be written to, "
+           f"found nowhere/file.{end}")
+          for line, end in (("everyday --recordings no.npz --svg", "svg"), ("adapt no.npz --out", "onnx"),
+                            ("import no.csv --participant 07 --out", "npz"))),
+        *((f"{command} --document no.md", f"--document: expected a page with the marks of `{block}`, found none in "
+           "no.md")
+          for command, block in (("everyday", "everyday"), ("evaluate", "figures"), ("stability", "filters"),
+                                 ("study", "study"))),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("lab")
@@ -96,17 +104,16 @@ def test_what_no_command_can_work_with_is_named(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("flag", ["--out", "--cache"])
+@pytest.mark.parametrize("line", ["train --out", "train --cache", "study --out"])
 @pytest.mark.usefixtures("lab")
 def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
-    flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
-    assert main(["train", flag, "taken"]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("gestured-lab: ")
-    assert "taken" in line
+    assert main([*line.split(), "taken"]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("gestured-lab: ") and "taken" in said
 
 
 def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -233,7 +233,6 @@ def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused
         (["--seconds", "0"], "--seconds: expected more than 0, at most 3600, found 0"),
         (["--jobs", "0"], "--jobs: expected 1 or more, found 0"),
         (["--recordings", "a.npz", "--document", "p.md"], "--document: expected no --recordings"),
-        (["--document", "nowhere.md"], "--document: expected a page with the marks of `everyday`"),
         (["--recordings", "nowhere.mcap"], "nowhere.mcap: cannot be read"),
     ],
 )

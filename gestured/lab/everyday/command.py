@@ -15,7 +15,7 @@ from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import report
 from gestured.lab.everyday.hours import Heard, hear, points_of
 from gestured.lab.everyday.stretches import lived, recorded
-from gestured.lab.made_of import kept, made_of, renew
+from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.table import Table
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -51,8 +51,7 @@ def run(args: argparse.Namespace) -> int:
     lasts = "" if arming is None or arming == Arming(arming.by) else f" for {arming.seconds:g} s"
     armed = "" if arming is None else f"armed by {arming.by}{lasts}"
     block = f"{armed or 'everyday'}{of}"
-    if args.document and not kept(args.document, block):
-        raise GesturedError(f"--document: expected a page with the marks of `{block}`, found none in {args.document}")
+    require_marks(block, args.document)
     models = at(args.model, args.strictness)
     if args.arming and args.arming not in models[0].gestures:
         raise GesturedError(f"--arming: expected one of {', '.join(models[0].gestures)}, found {args.arming!r}")

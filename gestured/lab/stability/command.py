@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
 from gestured.lab.stability.filters import filters_table
@@ -28,6 +28,8 @@ WITHOUT_MODELS = {"filters": ("gestured.lab.stability.filters",), "day": ("gestu
 
 def run(args: argparse.Namespace) -> int:
     """Run `gestured-lab stability`."""
+    for name in TABLES:
+        require_marks(name, args.document)
     done = []
     for name, make in TABLES.items():
         table = make(args.quick)

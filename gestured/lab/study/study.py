@@ -17,7 +17,7 @@ import torch
 import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.study import cohort, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import TUNING, choices, tune
@@ -44,11 +44,14 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     if args.seeds < 1:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
+    if args.document:
+        require_marks("study", args.document[0])
+        require_marks("choice", *args.document[1:])
+    args.out.mkdir(parents=True, exist_ok=True)
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
     schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
     study = compute(plan, schedule, args.real, args.foreign)
     study["about"]["command"] = args.words
-    args.out.mkdir(parents=True, exist_ok=True)
     with atomic_write(args.out / "study.json", PUBLIC) as file:
         file.write(json.dumps(study).encode())
     tables_path = write_report(study, args.out)
