@@ -10,6 +10,8 @@ from gestured.core.address import Address
 from gestured.core.errors import SettingsError
 
 SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of root
+SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
+SOCKET_PATH = f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long"
 UNIX_SOCKETS = Path("/proc/net/unix")
 LISTENS = "00010000"  # the flag of a listening socket there
 

@@ -1,5 +1,6 @@
 """A Unix stream socket on which the daemon speaks JSON Lines."""
 
+import os
 import queue
 import socket
 import threading
@@ -7,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES
 from gestured.client.peer import Stranger, check_peer
 from gestured.core.errors import GesturedError
 from gestured.core.messages import json_object
@@ -35,17 +37,26 @@ class Lines:
     """One connection to a daemon's Unix socket; a context manager."""
 
     def __init__(self, path: Path, flag: str) -> None:
-        """Connect to `path`; `flag` is the option that an error names. Raises Unreachable (or Forbidden), Stranger."""
+        """Connect to `path`; `flag` is the option that an error names. Raises Unreachable (or Forbidden), Stranger.
+
+        A daemon whose queue is full is not waited for. GesturedError for what can be no socket's path.
+        """
+        if "\0" in str(path) or len(os.fsencode(path)) > SOCKET_PATH_BYTES:
+            raise GesturedError(f"{str(path)!r}: expected {SOCKET_PATH}")
         self.path = path
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.socket.setblocking(False)
         try:
             self.socket.connect(str(path))
         except OSError as error:
             self.socket.close()
+            if isinstance(error, BlockingIOError):
+                raise Unreachable(f"the daemon on {path} takes no more connections: it hangs, or is busy") from None
             if isinstance(error, PermissionError):
                 raise Forbidden(f"{path}: {error.strerror}: it is for members of its group") from None
             reason = error.strerror or error
             raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its {flag}") from None
+        self.socket.setblocking(True)
         try:
             check_peer(self.socket, path, flag)
         except Stranger:

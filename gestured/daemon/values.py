@@ -8,11 +8,10 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator
 
-from gestured.client.address import named
+from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES, named
 from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
-SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 
 
 class Destination(NamedTuple):
@@ -63,10 +62,9 @@ def _name(of: str) -> BeforeValidator:
 
 
 def _socket(value: object) -> Path:
-    expected = f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long"
-    path = _named(value, expected)
+    path = _named(value, SOCKET_PATH)
     if len(os.fsencode(path)) > SOCKET_PATH_BYTES:
-        raise ValueError(expected)
+        raise ValueError(SOCKET_PATH)
     return path
 
 

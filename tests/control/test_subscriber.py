@@ -15,6 +15,7 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Forbidden, Refused, Unreachable, read_ahead
 from gestured.client.subscriber import LONGEST_S, Subscriber
+from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon
@@ -156,6 +157,22 @@ def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path):
     events = read_ahead(subscriber)
     subscriber.close()
     assert events.get(timeout=PATIENCE_S) is None
+
+
+def test_a_daemon_that_takes_no_connection_holds_up_no_timeout(fake: FakeDaemon):
+    fake.listener.listen(0)
+    with socket.socket(socket.AF_UNIX) as waits:
+        waits.connect(str(fake.path))
+        with Subscriber(fake.path, timeout=0.05) as subscriber, pytest.raises(TimeoutError):
+            next(subscriber)
+        with pytest.raises(Unreachable, match="takes no more connections"):
+            Control(fake.path)
+
+
+@pytest.mark.parametrize("path", ["/tmp/" + "a" * 103, "/tmp/a\0b", "\0a"])
+def test_a_path_that_no_socket_can_have_is_not_waited_for(path: str):
+    with pytest.raises(GesturedError, match=r"expected the path of a Unix socket, at most 107 bytes"):
+        next(Subscriber(path, timeout=1.0))
 
 
 def test_close_in_a_signal_handler_ends_the_iteration(fake: FakeDaemon):
