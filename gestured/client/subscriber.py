@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import os
 import selectors
 import socket
 import time
@@ -74,7 +75,7 @@ class Subscriber:
         self._wake, self._woken = socket.socketpair()
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._iterating = Lock()
-        self._closed = False
+        self._closed, self._pid = False, os.getpid()
 
     def __iter__(self) -> Self:
         return self
@@ -96,8 +97,13 @@ class Subscriber:
         return all(source.hello for source in self._sources)
 
     def close(self) -> None:
-        """End the iteration and hang up; a second call does nothing. Any thread and any signal handler may call it."""
+        """End the iteration and hang up; a second call does nothing. Any thread and any signal handler may call it.
+
+        In a forked child it leaves its parent's connections as they are.
+        """
         self._closed = True
+        if os.getpid() != self._pid:
+            return
         with suppress(OSError):  # the subscriber is closed already
             self._wake.send(b".")
         if self._iterating.acquire(blocking=False):  # else whoever iterates wakes now, and does it
@@ -152,6 +158,7 @@ class Subscriber:
                 self._receive(key.data)
 
     def _call(self, source: "_Source", now: float) -> None:
+        self._pid = os.getpid()  # whose connections these are
         try:
             source.lines = Lines(source.path, "--socket")
         except Forbidden:  # to call it again changes nothing

@@ -6,6 +6,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -150,6 +151,16 @@ def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon):
     assert events.get(timeout=PATIENCE_S) is None
     assert fake.client.recv(1) == b""
     subscriber.close()
+
+
+def test_close_in_a_forked_child_leaves_the_connection_to_its_parent(fake: FakeDaemon):
+    with Subscriber(fake.path) as subscriber:
+        asked(fake, subscriber, GESTURE)
+        child = get_context("fork").Process(target=subscriber.close)
+        child.start()
+        child.join()
+        fake.say(GESTURE | {"sequence": 5})
+        assert next(subscriber)["sequence"] == 5 and child.exitcode == 0
 
 
 def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path):
