@@ -4,7 +4,7 @@ import json
 import socket
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,8 @@ class Control(Lines):
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
         """The daemon's answer to a verb. Raises Refused with its reason, Unreachable where no answer comes."""
         request = {"verb": verb} | parameters
-        try:
+        with suppress(OSError):  # the daemon hung up; the reason that it gave before that is read below
             self.socket.sendall(json.dumps(request).encode() + b"\n")
-        except OSError:
-            pass  # the daemon hung up; the reason that it gave before that is read below
         self.socket.settimeout(self._patience_s)
         try:
             answer = next(self.lines(), None)
@@ -57,7 +55,5 @@ class Control(Lines):
     def finish(self) -> None:
         """End the requests: lines that are on their way still come, then `lines` ends. Any thread may call it."""
         self.finished = True
-        try:
+        with suppress(OSError):  # the daemon hung up already
             self.socket.shutdown(socket.SHUT_WR)
-        except OSError:
-            pass  # the daemon hung up already

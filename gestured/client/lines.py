@@ -5,6 +5,7 @@ import queue
 import socket
 import threading
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -74,10 +75,8 @@ class Lines:
 
     def close(self) -> None:
         """Hang up; a reader in another thread comes to its end."""
-        try:
+        with suppress(OSError):
             self.socket.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         self.socket.close()
 
     def __enter__(self) -> Self:
@@ -93,10 +92,9 @@ def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
 
     def read() -> None:
         try:
-            for line in lines:
-                waiting.put(line)
-        except GesturedError:
-            pass  # whoever waits for the next line is told that there is none
+            with suppress(GesturedError):  # whoever waits for the next line is told that there is none
+                for line in lines:
+                    waiting.put(line)
         finally:
             waiting.put(None)
 

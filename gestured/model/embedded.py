@@ -41,6 +41,7 @@ from gestured.model.own_file import OwnFileError
 _TAKES: Mapping[str, tuple[Any, str]] = {
     "model": (str | os.PathLike, "a name or a path"), "own_gestures": (str | os.PathLike | None, "a path"),
     "gestures": (Collection | None, "a list of names"), "zones": (Mapping | None, "four numbers for each name"),
+    "thresholds": (Mapping | None, "a confidence for each name, such as {'one_tap': 0.8}"),
     **dict.fromkeys(("tap_gap_s", "arming.seconds"), (SupportsFloat, "a number of seconds")),
     **dict.fromkeys(("mirror", "invert", "provisional", "touch"), (bool | np.bool_, "true or false")),
 }  # fmt: skip
@@ -187,7 +188,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             touch=touch,
             strictness=strictness,
             arming=Arming.of(arming),
-            thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
+            thresholds=_thresholds(ladder, thresholds or {}),
         )
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingsError(str(error)) from None
@@ -215,10 +216,6 @@ def _own(ladder: Ladder, path: Path) -> Own:
 
 def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:
     """Confidences by name, of the model's gestures and the user's own."""
-    if not isinstance(told, Mapping):
-        raise SettingsError(
-            f"thresholds: expected a confidence for each name, such as {{'one_tap': 0.8}}, found {told!r}"
-        )
     require_gestures(ladder, (name for name in told if name not in ladder.own.gestures))
     for name, least in told.items():
         if isinstance(least, bool) or not isinstance(least, int | float) or not 0 <= least <= 1:

@@ -10,7 +10,7 @@ import textwrap
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from datetime import date
 from pathlib import Path
 
@@ -99,10 +99,8 @@ class Session:
     def _await_sensor(self) -> None:
         self._terminal.say(f"Waiting for the sensor on {self._sensor.where}; do not touch it.")
         while not self._sensor.ready:
-            try:
+            with suppress(Paused):  # there is nothing to pause yet
                 self._until(lambda: self._sensor.ready)
-            except Paused:  # there is nothing to pause yet
-                pass
         rows, columns = self._sensor.grid
         self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.1f} Hz.")
 

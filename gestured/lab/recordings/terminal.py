@@ -41,10 +41,8 @@ class Terminal:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
-        try:
+        with suppress(termios.error):  # it has gone
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
-        except termios.error:  # it has gone
-            pass
 
     def fileno(self) -> int:
         """To wait for a key with `select`."""

@@ -44,9 +44,8 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     if args.seeds < 1:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
-    if args.document:
-        require_marks("study", args.document[0])
-        require_marks("choice", *args.document[1:])
+    require_marks("study", *(args.document or ())[:1])
+    require_marks("choice", *(args.document or ())[1:])
     args.out.mkdir(parents=True, exist_ok=True)
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
     schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
