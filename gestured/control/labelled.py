@@ -13,7 +13,7 @@ from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
-from gestured.record.judge import Outcome, Performed, Tally
+from gestured.record.judge import NONE, Outcome, Performed, Tally
 from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
@@ -32,6 +32,9 @@ class Labelled:
         self._found = found = recording.read(path)
         spans = [found.times_of(g) for g in range(len(found))]
         lengths = [float(times[-1] - times[0]) + BETWEEN_RECORDINGS_S for times in spans]
+        self.seconds = (
+            sum(lengths) - len(lengths) * BETWEEN_RECORDINGS_S
+        )  # of all recordings, without what lies between
         self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
         begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
         self._start = begin + np.cumsum([0.0, *lengths])[:-1]  # (G,) s, as it is played
@@ -79,13 +82,16 @@ class Labelled:
     def _performed(self) -> Iterator[Performed]:
         found = self._found
         for g, label in enumerate(found.labels.tolist()):
-            if label != SESSION:
-                times = found.times_of(g)
-                first = 0 if found.onsets is None else int(found.onsets[g])
+            if label != SESSION and found.onsets is not None:
+                times, first = found.times_of(g), int(found.onsets[g])
                 last = -1 if found.releases is None else int(found.releases[g])
                 kind = label if found.kinds is None else str(found.kinds[g])
                 yield self._played(g, label, kind, float(times[first]), float(times[last]))
-            elif found.event_recording is None:
+            elif label not in (SESSION, NONE):  # of a non-gesture whatever is said is false, whenever it began
+                raise RecordingError(
+                    f"{self._path}: onsets: is missing, expected the frame with which each performance begins"
+                )
+            elif label == SESSION and found.event_recording is None:
                 raise RecordingError(
                     f"{self._path}: event_labels: recording {g} is a session whose events are not known"
                 )

@@ -83,17 +83,14 @@ def play(path: Path, model: Model, played: Played) -> None:
     replay = Replay(dataclasses.replace(source.tape, events=()), scene, model)
     lines = [json.loads(messages.to_json(event, replay.epoch)) for event in replay.events()]
     events = [line for line in lines if line["type"] == "gesture"]
-    performed = source.performed() if isinstance(source, Labelled) else []
-    known = [one for one in performed if _knew(replay, one.onset)]
-    played.skipped += len(performed) - len(known)
-    # A sensor that sends only while it is touched is there in its pauses, but nobody says so for a whole night.
-    steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))
-    played.seconds += sum(min(step / 1e9, ABSENT_S) for step in steps)
-    played.add(known, events)
-
-
-def _knew(replay: Replay, t: float) -> bool:
-    return any(sensor.knew(t - replay.epoch) for sensor in replay.played.values())
+    if isinstance(source, Labelled):
+        played.seconds += source.seconds
+        played.add(source.performed(), events, lambda t: replay.played["recording"].knew(t - replay.epoch))
+    else:
+        # A sensor that sends only while it is touched is there in its pauses, but nobody says so for a whole night.
+        steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))
+        played.seconds += sum(min(step / 1e9, ABSENT_S) for step in steps)
+        played.add([], events)
 
 
 def _figures(tuned: Tuned) -> dict[str, Any]:

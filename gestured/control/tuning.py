@@ -5,7 +5,7 @@ A recording is played once; at every threshold it is only counted again.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -44,15 +44,25 @@ class Played:
         """How many gestures were performed; where none were, how many are assumed."""
         return len(self.performed) or GESTURES_AN_HOUR * self.hours
 
-    def add(self, performed: Iterable[Performed], events: Iterable[Mapping[str, Any]]) -> None:
-        """What one recording holds, and its events in their order, published from no confidence at all."""
-        asked = sorted(performed, key=lambda one: one.onset)
-        self.performed += [one for one in asked if one.label != NONE]
-        self.others += sum(one.label == NONE for one in asked)
-        said = list(events)
-        spans = [(float(event["onset"]), float(event["offset"])) for event in said]
-        for event, performed_then in zip(said, owners(spans, asked), strict=True):
-            self.said.append(Said(str(event["gesture"]), float(event["confidence"]), performed_then))
+    def add(
+        self,
+        performed: Sequence[Performed],
+        events: Sequence[Mapping[str, Any]],
+        knew: Callable[[float], bool] = lambda t: True,
+    ) -> None:
+        """What one recording holds, and its events in their order, published from no confidence at all.
+
+        What began before the sensor was known, as `knew` says of a time (s), is left out with all that was said of it.
+        """
+        spans = [(float(event["onset"]), float(event["offset"])) for event in events]
+        used = [one for one in performed if knew(one.onset)]
+        left_out = {id(one) for one in performed} - {id(one) for one in used}
+        self.skipped += len(left_out)
+        self.performed += [one for one in used if one.label != NONE]
+        self.others += sum(one.label == NONE for one in used)
+        for event, performed_then in zip(events, owners(spans, performed), strict=True):
+            if id(performed_then) not in left_out:
+                self.said.append(Said(str(event["gesture"]), float(event["confidence"]), performed_then))
 
 
 @dataclass(frozen=True)
@@ -180,7 +190,16 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
     alike = [estimated(played, t, share_missed(model.metadata.curve, t)) for t in CANDIDATES]
     stored = (model.points or {}).items()
     points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored}
-    best, single = proposed(alike, model.threshold, most), dict[str, Counts]()
+    usual = points.get(USUAL)
+    stated = model.points[USUAL].false_per_hour if model.points and most is None and not played.performed else None
+    few = stated and allowed(stated, played.hours)
+
+    def may_be(row: Counts) -> bool:
+        """Where nobody performed anything: whether hours show that what says more than usual is no more often false."""
+        seldom = usual is None or (row.missed or 0) >= (usual.missed or 0)
+        return stated is None or seldom or (few is not None and row.unmeant <= few)
+
+    best, single = proposed([row for row in alike if may_be(row)], model.threshold, most), dict[str, Counts]()
     if best is not None and best.threshold is not None and played.performed:
         single = for_each(played, best.threshold, no_more=most is not None)
         together = counted(played, {name: single.get(name, best).threshold or 0.0 for name in model.gestures})
@@ -188,13 +207,13 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
             best = replace(together, threshold=best.threshold)
         else:
             single = {}
-    rows = (points.get(USUAL), *points.values(), best)  # of those that cost the same the first is taken
-    best = proposed([row for row in rows if row is not None], model.threshold, most)
+    rows = (usual, *points.values(), best)  # of those that cost the same the first is taken
+    best = proposed([row for row in rows if row is not None and may_be(row)], model.threshold, most)
     if best is None and most is not None:
         left = {name: counted(played, CANDIDATES[-1], name).unmeant for name in model.gestures}
         raise GesturedError(
             f"--budget {budget:g}: at {CANDIDATES[-1]} there are still {sum(left.values())} false ones in "
             f"{played.hours:.3g} hours, expected at most {most}; most of them are {max(left, key=left.__getitem__)}"
         )
-    now = points.get(USUAL) or estimated(played, model.threshold, None)
+    now = usual or estimated(played, model.threshold, None)
     return Tuned(model, played, alike[: len(THRESHOLDS)], points, now, budget, most, best, single)

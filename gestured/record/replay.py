@@ -90,7 +90,7 @@ class Played:
 
     def knew(self, t: float) -> bool:
         """Whether the idle sensor had been learned by `t` s, so that a touch could be told from it."""
-        since = [known for new, known in self._learned if new <= t]
+        since = [known for new, known in self._learned if new <= t + 1e-6]  # stamps and labels are rounded
         return bool(since) and since[-1] <= t
 
 
@@ -133,7 +133,10 @@ class Replay:
         now = 0.0
         gates = deque(event for event in self._tape.events if event["type"] == "gate")
         for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
-            now = (t_ns - self._start) / 1e9
+            now, before = (t_ns - self._start) / 1e9, now
+            if not self._tape.scene:  # no daemon made it, of which packets alone would tell how long it stood still
+                silent = before + 2 * self._hub.scene.stale_s
+                yield from self._seen(self._hub.tick(silent) if silent < now else [])
             while gates and gates[0]["since"] - self.epoch < now:
                 yield from self._seen(self._gate(gates.popleft()))
             yield from self._seen(self._hub.receive([(packet.data, packet.source) for packet in packets], now))

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,9 +21,11 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.record.judge import Performed
+from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES
 from tests.core import test_gates, test_hub
 from tests.daemon import tiny_model
+from tests.daemon.harness import Hand
 from tests.lab.adapt.recorded import whole_session
 from tests.small_model import operating_points
 
@@ -188,6 +191,49 @@ def test_a_night_in_which_no_packet_came_shows_nothing(models: dict[bool, Model]
     assert len(played.said) == 12
 
 
+def taps(path: Path, *, onset: int | None, label: str = "one_tap") -> Path:
+    """Three recordings of two quiet seconds and a tap, of which each ends while a second tap could still come."""
+    hand, each = Hand(), 37
+    frames = np.array(3 * (hand.idle(2.0) + hand.tap() + hand.idle(1 / 3)))
+    found = Recordings(
+        frames=frames,
+        times=np.tile(np.arange(each) / 15, 3),
+        offsets=np.arange(4) * each,
+        labels=np.array([label] * 3),
+        subjects=np.zeros(3, int),
+        onsets=None if onset is None else np.full(3, onset),
+        releases=None if onset is None else np.full(3, 31),
+    )
+    write(path, found)
+    return path
+
+
+def test_between_two_recordings_no_time_passes_and_what_waits_is_answered(
+    models: dict[bool, Model], tmp_path: Path
+) -> None:
+    play(taps(tmp_path / "taps.npz", onset=30), models[False], played := Played())
+    assert played.seconds == pytest.approx(3 * 36 / 15)
+    assert counted(played, 0.0) == Counts(0.0, right=3, wrong=0, missed=0, false=0, unmeant=0)
+
+
+def test_what_is_said_of_a_performance_that_is_left_out_counts_neither_way(
+    models: dict[bool, Model], tmp_path: Path
+) -> None:
+    """It began before the sensor was known."""
+    play(taps(tmp_path / "taps.npz", onset=0), models[False], played := Played())
+    assert (played.skipped, played.performed, played.said) == (3, [], [])
+    play(taps(tmp_path / "others.npz", onset=None, label="none"), models[False], played)
+    assert counted(played, 0.0).false == 3
+
+
+def test_few_hours_do_not_make_it_say_more(models: dict[bool, Model]) -> None:
+    """Nobody performed anything, and nothing false was said: so it would be at any threshold in a minute."""
+    for hours, strictness in ((0.1, "normal"), (9.0, None)):
+        tuned = tune(models[True], Played(seconds=3600 * hours), None)
+        assert tuned.best is not None and tuned.strictness == strictness
+    assert tuned.best.threshold == 0.05
+
+
 def test_what_cannot_be_tuned_on_is_one_sentence(
     recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +241,7 @@ def test_what_cannot_be_tuned_on_is_one_sentence(
     for arguments, reason in (
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
         ([tmp_path / "none.mcap"], "none.mcap"),
+        ([taps(tmp_path / "08.npz", onset=None)], "08.npz: onsets: is missing, expected the frame with which each"),
         ([recorded, "--budget", "0.5"], "hours cannot show it, even if nothing false was said in them, expected at"),
         ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),
         ([recorded, "--model", "nobody"], "nobody: no shipped model"),
