@@ -20,8 +20,8 @@ from gestured.bridge.broker import PLAIN_PORT, TLS_PORT
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.mqtt_session import Mqtt
-from gestured.bridge.options import add_filters, add_metrics, need, on_stop, subscriber
-from gestured.client.program import Commands
+from gestured.bridge.options import add_filters, add_metrics, need, subscriber
+from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
 
 

@@ -4,7 +4,6 @@ import argparse
 import importlib
 import os
 import re
-import signal
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -64,12 +63,6 @@ def plain(name: str) -> str:
 def host_name(named: str | None) -> str:
     """The plain name that was given, else this machine's."""
     return plain(named or socket.gethostname())
-
-
-def on_stop(act: Callable[[], object]) -> None:
-    """Act when SIGTERM or Ctrl-C asks for the end."""
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: act())
 
 
 def names(text: str) -> list[str]:

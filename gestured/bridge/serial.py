@@ -13,10 +13,10 @@ import time
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.options import BridgeError, add_destination, add_metrics, need, on_stop
+from gestured.bridge.options import BridgeError, add_destination, add_metrics, need
 from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped, signed
-from gestured.client.program import Commands
+from gestured.client.program import Commands, on_stop
 from gestured.client.sensor import Form, connected, sent_after_refusal
 from gestured.client.values import rows_by_columns, sensor_name
 from gestured.core.frames import Frame

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
-from gestured.bridge.options import add_destination, add_filters, add_metrics, need, on_stop, subscriber
+from gestured.bridge.options import add_destination, add_filters, add_metrics, need, subscriber
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
-from gestured.client.program import Commands
+from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
 
 

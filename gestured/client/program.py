@@ -2,8 +2,9 @@
 
 import argparse
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TextIO, TypeAlias
 
 import gestured
@@ -49,6 +50,18 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
         for stream in (sys.stdout, sys.stderr):
             _give_up(stream)
     return status
+
+
+def on_stop(act: Callable[[], object]) -> None:
+    """Act when SIGTERM or Ctrl-C asks for the end."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: act())
+
+
+def stop_as_by_ctrl_c() -> None:
+    """Let SIGTERM, and a terminal that is closed, end this program as Ctrl-C does: what it has started ends, too."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
 
 
 def _give_up(stream: TextIO) -> None:

@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import signal
 import threading
 from pathlib import Path
 
@@ -37,12 +36,6 @@ def event_path(args: argparse.Namespace) -> Path:
         status = daemon.ask("status")
         with daemon.reading():
             return Path(status["addresses"]["socket"])
-
-
-def finish_on_signals(control: Control) -> None:
-    """From now on Ctrl-C and SIGTERM let `control.lines()` end, after what the daemon has said by then."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: control.finish())
 
 
 def finish_after(control: Control, seconds: float) -> None:

@@ -3,7 +3,6 @@
 import argparse
 import math
 import queue
-import signal
 import sys
 import threading
 import time
@@ -19,7 +18,7 @@ from gestured.client.lines import read_ahead
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import PadServer
 from gestured.client.picture import trace
-from gestured.client.program import Commands
+from gestured.client.program import Commands, stop_as_by_ctrl_c
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
@@ -58,8 +57,7 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
-    for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
-        signal.signal(signalled, signal.default_int_handler)
+    stop_as_by_ctrl_c()
     ((_, take),) = takes(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)

@@ -1,7 +1,6 @@
 """`gesturectl pad`: a mouse, a touchscreen or a telephone as a sensor."""
 
 import argparse
-import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,7 +9,7 @@ from gestured.client.engine import Engine
 from gestured.client.pad.invitation import invite
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import DEFAULT, PadServer
-from gestured.client.program import Commands
+from gestured.client.program import Commands, stop_as_by_ctrl_c
 from gestured.client.say import say, tell
 from gestured.client.values import bind_address, host_port, number, rows_by_columns, sensor_name
 from gestured.control.address import add_sockets, event_path
@@ -43,8 +42,7 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C, SIGTERM, or ten minutes without a touch."""
-    for signalled in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(signalled, signal.default_int_handler)
+    stop_as_by_ctrl_c()
     with ExitStack() as held:
         if args.to is None:
             engine = held.enter_context(Engine(args.model, *args.grid))

@@ -12,10 +12,10 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable, read_ahead
-from gestured.client.program import Commands
+from gestured.client.program import Commands, on_stop
 from gestured.client.say import say, say_json
 from gestured.client.values import number
-from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_after
 from gestured.core.address import Address
 from gestured.record.tape_writer import Writer
 
@@ -46,7 +46,7 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the file full, the daemon gone, or Ctrl-C; 1 where something was lost."""
     with connect(args) as control:
-        finish_on_signals(control)
+        on_stop(control.finish)  # what the daemon has said by then still comes
         scene = control.ask("tap")
         with Writer(args.file, scene, args.max_mib << 20) as tape:
             say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)

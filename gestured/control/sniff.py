@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from gestured.client.address import bind_failure
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
-from gestured.client.program import Commands
+from gestured.client.program import Commands, on_stop
 from gestured.client.say import say, shown, tell
 from gestured.client.values import host_port, number
-from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_after
 from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, propose, split_address
 from gestured.control.sight import Seen, Sight
 from gestured.core.address import Address
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
                 sight.packet(t, source, packet)
         else:
             with connect(args) as control:
-                finish_on_signals(control)
+                on_stop(control.finish)  # what the daemon has said by then still comes
                 told = overhear(control, args.seconds, sight)
     except KeyboardInterrupt:
         pass

@@ -2,11 +2,10 @@
 
 import argparse
 import os
-import signal
 import sys
 from pathlib import Path
 
-from gestured.client.program import Commands
+from gestured.client.program import Commands, stop_as_by_ctrl_c
 from gestured.client.say import say, tell
 from gestured.client.values import bind_address
 from gestured.control.address import add_sockets, connect, control_path
@@ -43,8 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from gestured.control.view.server import ViewServer
     from gestured.control.view.source import Source
 
-    for signalled in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(signalled, signal.default_int_handler)
+    stop_as_by_ctrl_c()
     if not is_loopback(args.listen.host):
         raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
     connect(args).close()  # who has no daemon, is told so at once
