@@ -121,6 +121,8 @@ def allowed(per_hour: float, hours: float) -> int | None:
     Events that come by chance (Poisson): none in three times as long as one may take. None where no count shows it.
     """
     mean, chance, count = per_hour * hours, 0.0, -1
+    if mean == 0:
+        return None
     while True:
         chance += math.exp((count + 1) * math.log(mean) - mean - math.lgamma(count + 2))
         if chance > DOUBT:
@@ -191,13 +193,13 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
     stored = (model.points or {}).items()
     points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored}
     usual = points.get(USUAL)
-    stated = model.points[USUAL].false_per_hour if model.points and most is None and not played.performed else None
-    few = stated and allowed(stated, played.hours)
+    # Where nobody performed anything, what says more than usual must be shown to be false no more often.
+    unasked = usual is not None and budget is None and not played.performed
+    few = allowed(model.points[USUAL].false_per_hour, played.hours) if model.points and unasked else None
 
     def may_be(row: Counts) -> bool:
-        """Where nobody performed anything: whether hours show that what says more than usual is no more often false."""
-        seldom = usual is None or (row.missed or 0) >= (usual.missed or 0)
-        return stated is None or seldom or (few is not None and row.unmeant <= few)
+        more = usual is not None and (row.missed or 0) < (usual.missed or 0)
+        return not (unasked and more) or (few is not None and row.unmeant <= few)
 
     best, single = proposed([row for row in alike if may_be(row)], model.threshold, most), dict[str, Counts]()
     if best is not None and best.threshold is not None and played.performed:

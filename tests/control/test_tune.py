@@ -83,6 +83,7 @@ def test_what_is_proposed_costs_least(said: list[tuple[str, float]]) -> None:
 def test_a_budget_is_shown_where_its_upper_limit_is(count: int, limit: float, per_hour: float) -> None:
     assert allowed(per_hour, 1.001 * limit / per_hour) == count
     assert allowed(per_hour, 0.999 * limit / per_hour) == (count - 1 if count else None)
+    assert allowed(per_hour, 0.0) is allowed(0.0, 1.0) is None
 
 
 def model_of(path: Path, **metadata: str) -> Model:
