@@ -95,9 +95,9 @@ def main() -> None:
     assert data.real is not None, f"{args.real}: expected {' and '.join(REAL_FILES)}"
     alone = replace(data, real=None)
     simulated = learn(plan, alone, args.cache)  # the stage before real people, which all share
-    base, calibration, _ = judged(simulated, NAME, calibration_set(simulated, alone, plan))
+    base, calibration, _ = judged(simulated, NAME, calibration_set(simulated, alone))
     trained = learn(plan, data, args.cache)
-    calibrated = calibration_set(trained, data, plan)
+    calibrated = calibration_set(trained, data)
     takes = simulate(args.cache, 2)
     own = own_recordings([args.real / REAL_FILES[0]])  # the sessions hold the same touches again
     subjects = np.array([int(name) for name in own.names])

@@ -34,7 +34,7 @@ NET = "cnn_lstm"
 
 def without(part: Trained, data: TrainingData, plan: TrainingPlan, path: Path) -> Model:
     """The networks of a fold, calibrated on simulated people alone, as a file that the daemon would open."""
-    module, calibration, answered = decided(part, NET, calibration_set(part, data, plan), data)
+    module, calibration, answered = decided(part, NET, calibration_set(part, data), data)
     seen = quantiles(data.teach) | answered
     export_net(
         module,

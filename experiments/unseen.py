@@ -145,7 +145,7 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
 
 def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: Sequence[int]) -> list[Said]:
     """What a network that was trained and calibrated on these data answers on the test sets."""
-    module, calibration, _ = judged(trained, NAME, calibration_set(trained, data, plan))
+    module, calibration, _ = judged(trained, NAME, calibration_set(trained, data))
     least = calibration["threshold"]
     return [
         Said(test, opinions(module, samples).answers(module.decision, module.verifier), samples, least, classes)

@@ -12,7 +12,7 @@ from gestured.lab.export import NAME
 from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.recordings.origin import said
-from gestured.lab.train import REAL_SETS, TrainingPlan
+from gestured.lab.train import MIXED, TrainingPlan
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 from gestured.simulator import NON_GESTURES
@@ -77,7 +77,6 @@ def _by_kind(name: str, found: Mapping[str, Any]) -> list[str]:
 
 
 SETS = ("simulated, nominal", "simulated, wide", "real")
-MIXED = REAL_SETS[1]  # the set of real recordings that has non-gestures, too
 WORST_OF = {
     "gesture": "gesture, named rightly",
     "person": "person, named rightly",

@@ -54,7 +54,7 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     found = simulated_figures(paths, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     trained = learn(plan, data, args.cache)
-    for name, of in real_figures(trained, calibration_set(trained, data, plan), data).items():
+    for name, of in real_figures(trained, calibration_set(trained, data), data).items():
         figures[name]["real"] = of
     print("\n".join(table(figures)), flush=True)
     write_manifest(args.models, figures)

@@ -17,7 +17,17 @@ from gestured.lab.decide import Answers, confidence
 from gestured.lab.fit import CLASSES, RECURRENT, padded, targets
 from gestured.lab.intervals import interval
 from gestured.lab.samples import Samples
-from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
+from gestured.lab.train import (
+    MIXED,
+    REAL_SETS,
+    Calibrated,
+    Trained,
+    TrainingData,
+    calibration_set,
+    folds,
+    is_of,
+    judged,
+)
 from gestured.lab.verifier import Evidence
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -161,7 +171,10 @@ def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> C
 
 
 def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -> dict[str, Any]:
-    """Real subjects, each by the networks that have not seen them, calibrated without them."""
+    """Real subjects, each by the networks that have not seen them, calibrated without them.
+
+    The first network also before it learned from any real recording, which shows what real recordings bought.
+    """
     real = data.real
     if real is None or trained.held_out is None:
         print("real recordings: left out, they are not here (--real FOLDER)")
@@ -185,4 +198,16 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
             result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
             found.setdefault(name, {})[title] = asdict(result) | {"worst": worst(answers, real.take(chosen), least)}
         found[name]["kinds"] = by_kind((scores, unknown), real, least)
+        if name == RECURRENT[0]:
+            title = f"{MIXED}, learned from simulation alone"
+            found[name][title] = _by_simulation(trained, name, data, real.take(np.flatnonzero(judged_once)))
     return found
+
+
+def _by_simulation(trained: Trained, name: str, data: TrainingData, real: Samples) -> dict[str, Any]:
+    """Real subjects by a network before it learned from any real recording, calibrated without any."""
+    assert trained.start is not None
+    alone = Trained(trained.start, None)
+    module, calibration, _ = judged(alone, name, calibration_set(alone, data), data)
+    given = alone.evidence(name, real).answers(module.decision, module.verifier)
+    return asdict(outcome(given, targets(real), calibration["threshold"], data.performed.get(MIXED), real.people))

@@ -42,6 +42,7 @@ from gestured.simulator import GESTURES
 from gestured.simulator.cohort import wide_plan
 
 REAL_SETS = ("taps and swipes", "with non-gestures")  # sets of real recordings that judge
+MIXED = REAL_SETS[1]  # the one that has non-gestures, too
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
 COHORT = 1_000_000  # the wide stream's people have larger numbers
@@ -181,6 +182,7 @@ class Trained:
     nets: nn.ModuleDict
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
     folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
+    start: nn.ModuleDict | None = None  # those that had not seen any real recording; None where these are `nets`
     _kept: dict[tuple[str, str], Evidence] = field(default_factory=dict)
 
     def evidence(self, name: str, samples: Samples) -> Evidence:
@@ -209,7 +211,7 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
         apart.append(_kept(path, start, data, seen, plan, f"fold {k + 1}/{FOLDS}"))
         for name, found in logits(apart[-1], data.real.take(held)).items():
             held_out[name][torch.from_numpy(held)] = found
-    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart)
+    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart, start)
 
 
 def _kept(
@@ -229,7 +231,7 @@ class Calibrated:
     sets: NDArray[np.int64]  # 0: anybody on any sensor, 1: the cohort, 2: real people
 
 
-def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Calibrated:
+def calibration_set(trained: Trained, data: TrainingData) -> Calibrated:
     """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
     found, labels = logits(trained.nets, data.calibrate), targets(data.calibrate)
     sets = (data.calibrate.people < COHORT).astype(np.int64)
@@ -296,7 +298,7 @@ def train(
     torch.set_num_threads(max(jobs, 1))
     data = load_data(plan, cache, real, jobs, recordings)
     trained = learn(plan, data, cache)
-    calibrated = calibration_set(trained, data, plan)
+    calibrated = calibration_set(trained, data)
     digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()
     common: dict[str, Any] = {
         "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,

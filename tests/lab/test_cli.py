@@ -201,7 +201,9 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     text = capsys.readouterr().out
     figures = json.loads(text[text.index("\n{\n") :])
     assert figures.keys() == set(LADDER)
-    assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
+    bought = "with non-gestures, learned from simulation alone"
+    assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures", bought}
+    assert f"real, {bought}" in page.read_text()
     asked = set(figures["cnn_lstm"]["simulated"]["wide"]["kinds"]) & set(NON_GESTURES)
     assert asked and asked <= set(re.findall(r"\w+", page.read_text()))  # the page names what each kind comes to
     told = figures["cnn_lstm"]["simulated"]["wide"]["worst"]
