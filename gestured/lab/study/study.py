@@ -100,6 +100,7 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
         },
         "methods": {method.id: _about(method.id, tuned) for method in METHODS.values()},
         "cells": list(figures.values()),
+        "trials": tables.by_trial(found, people.trials()),
         "copies": tables.copies(found),
         "tuning": tuning,
         "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),

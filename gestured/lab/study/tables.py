@@ -13,7 +13,8 @@ from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.protocols import CLEAN, FOREIGN, PADDED, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
 from gestured.lab.study.views import Values
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, SPEEDS, Trial
+from gestured.simulator.people import INCLINATIONS
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,25 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
         "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
         "train": result["train"], "seconds": result["seconds"], "confusion": confusion.tolist(),
     }  # fmt: skip
+
+
+def by_trial(found: Mapping[Cell, Result], trials: Sequence[Trial]) -> list[dict[str, Any]]:
+    """Of each method, tuned and with shifted copies, the share right of people held out, by speed and inclination.
+
+    `trials` is what was performed, for each gesture of the simulated cohort.
+    """
+    speeds = np.array([trial.speed for trial in trials])
+    inclinations = np.array([trial.inclination for trial in trials])
+    out = []
+    for cell, result in found.items():
+        if (cell.settings, cell.augmentation, cell.protocol) == (TUNED, SHIFT, PARTICIPANTS):
+            good, source = right(result), np.array(result["source"])
+            out.append({
+                "method": cell.method,
+                "speed": {name: _mean(good[speeds[source] == name]) for name in SPEEDS},
+                "inclination": {str(n): _mean(good[inclinations[source] == n]) for n in INCLINATIONS},
+            })  # fmt: skip
+    return out
 
 
 def _spread(shares: Sequence[float]) -> float:

@@ -38,6 +38,7 @@ def made_study() -> Study:
         "data": data,
         "methods": {method: _method(method) for method in METHODS},
         "cells": [cell for method in METHODS for cell in _cells(method)],
+        "trials": [_trials(method) for method in METHODS],
         "copies": [_copies(method) for method in METHODS],
         "choices": [
             {"choice": "wavelet", "ours": "haar", "method": "st_svm",
@@ -83,6 +84,12 @@ def _cells(method: str) -> list[Study]:
             "seconds": 12.5, "confusion": [[45 * (i == k) + 3 for i in range(10)] for k in range(10)],
         })  # fmt: skip
     return cells
+
+
+def _trials(method: str) -> Study:
+    strength = _strength(method)
+    speed = {"slow": strength, "normal": strength + 0.01, "fast": strength - 0.13}
+    return {"method": method, "speed": speed, "inclination": {str(n): strength - 0.02 * n for n in range(3)}}
 
 
 def _copies(method: str) -> Study:

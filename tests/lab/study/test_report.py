@@ -67,6 +67,14 @@ def test_every_cell_of_the_main_tables_stands_in_the_row_of_its_method(report: P
             assert row[3] == f"{cell['published']:.2f}"
 
 
+def test_how_speed_and_inclination_matter_stands_in_the_row_of_each_method(report: Path, study: Study) -> None:
+    rows = rows_of(report)
+    assert ["method", *study["trials"][0]["speed"], "tilted 0°", "tilted 30°", "tilted 60°"] in rows
+    for one in study["trials"]:
+        shares = [*one["speed"].values(), *one["inclination"].values()]
+        assert [METHODS[one["method"]][0], *(f"{share:.2f}" for share in shares)] in rows
+
+
 def test_all_else_is_told(report: Path, study: Study) -> None:
     cells = {cell for row in rows_of(report) for cell in row}
     told = (

@@ -17,7 +17,19 @@ from gestured.lab.study.methods import METHODS
 from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
 
-SECTIONS = ("about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "online")
+SECTIONS = (
+    "about",
+    "machine",
+    "data",
+    "methods",
+    "cells",
+    "trials",
+    "copies",
+    "tuning",
+    "choices",
+    "run_time",
+    "online",
+)
 LEFT = ("tp_rf", "lstm", "cnn_lstm")  # those that ship
 
 
@@ -52,6 +64,12 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
         (m, p) for m in LEFT for p in ("paper", "clean", "participants", "foreign")
     }
     assert all(0 <= c["low"] <= c["right"] <= c["high"] <= 1 for c in first["cells"])
+    assert all(set(of["speed"].values()) >= {None} and of["inclination"]["0"] is None for of in first["trials"])
+    assert {of["method"]: of["speed"]["normal"] for of in first["trials"]} == {
+        c["method"]: c["right"]
+        for c in first["cells"]
+        if (c["protocol"], c["augmentation"]) == ("participants", "shift")
+    }  # the only speed that these few trials have
     assert first["data"]["simulated"]["cut"] + first["data"]["simulated"]["lost"] == len(few)
     assert {**second, "about": 0, "machine": 0} == {**first, "about": 0, "machine": 0}
     assert (tmp_path / "first" / "tables.md").exists() and (tmp_path / "first" / "operating-points.svg").exists()
