@@ -78,6 +78,14 @@ def test_who_trickles_a_request_keeps_nobody_out(view: Page) -> None:
         sock.close()
 
 
+@pytest.mark.parametrize("target", ["http://[", "http://[x]/", "//[::1/stream", "*"])
+def test_an_address_that_is_none_gets_an_answer(view: Page, target: str) -> None:
+    with socket.create_connection(view.address, timeout=DEADLINE_S) as sock:
+        sock.sendall(f"GET {target} HTTP/1.1\r\nHost: {view.address}\r\n\r\n".encode())
+        said = sock.makefile("rb").readline()
+    assert said.split()[1:2] in ([b"400"], [b"404"])
+
+
 def test_a_sensor_that_cannot_be_is_refused_and_the_other_pages_go_on(view: Page, real: Daemon, arm: str) -> None:
     view.come_in()
     sensor = Sensor(real, arm).begin()

@@ -115,7 +115,11 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:  # noqa: N802  # http.server's name
         """The page, its parts, and the stream."""
-        where = urlsplit(self.path)
+        try:
+            where = urlsplit(self.path)
+        except ValueError:
+            self.refuse(HTTPStatus.BAD_REQUEST, "no address")
+            return
         if not at_home(self.headers, self.server.address):
             self.refuse(HTTPStatus.FORBIDDEN, "another host, or another site's page")
         elif (file := self.server.files.get(where.path)) is not None:  # nothing in them is anybody's
