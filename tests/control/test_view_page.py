@@ -1,6 +1,8 @@
 """The page of `gesturectl view` in a real browser."""
 
+import json
 import re
+import signal
 import threading
 import tomllib
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -197,6 +199,68 @@ def _is_told(page: Page, daemon: Daemon, browser: Browser) -> None:
     assert not browser.run("document.body.classList.contains('absent')")
     daemon.stop()
     browser.until("document.body.classList.contains('absent')")  # what is shown is of before
+
+
+def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
+    model: Path, tmp_path: Path, browser: Browser
+) -> None:
+    flags = ("--clock", "sensor", "--stale-s", 30)
+    daemon = Daemon.start(tmp_path, model, *flags)
+    with viewing(daemon.ready["control"]) as page:
+        follow(page, browser, "constructor", daemon)  # as everything in JavaScript has one
+        usable = "['recalibrate', 'gate'].every(id => !document.getElementById(id).disabled)"
+        browser.until(usable)
+        daemon.stop()
+        browser.until("document.body.classList.contains('absent')")
+        assert not browser.run(usable) and browser.run("document.getElementById('listens').textContent") == ""
+        daemon = Daemon.start(tmp_path, model, *flags)
+        try:
+            Sensor(daemon, "another").begin()
+            browser.until("document.getElementById('sensor').options.length === 2")
+            chosen = browser.run("[document.getElementById('sensor').value, state.sensor]")
+            assert chosen == ["constructor", "constructor"]
+            shown = browser.run("document.getElementById('sensor').selectedOptions[0].text")
+            assert shown == "constructor (not heard so far)"
+            assert browser.run("document.getElementById('listens').textContent") == "not heard so far"
+            assert not browser.run(usable) and browser.run("document.body.classList.contains('absent')")
+            before = browser.run("state.frames.length && state.frames[state.frames.length - 1].t")
+            Sensor(daemon, "constructor").begin()
+            browser.until(f"({usable}) && document.getElementById('listens').textContent === 'listens'")
+            browser.until(f"state.frames[state.frames.length - 1].t !== {before}")
+            assert browser.run("document.getElementById('sensor').selectedOptions[0].text") == "constructor"
+        finally:
+            daemon.stop()
+    assert not [said for said in browser.complaints() if "Exception" in said]
+
+
+def test_a_daemon_that_hangs_is_said_and_seen_again_by_itself(serve, browser: Browser) -> None:
+    daemon = serve("--stale-s", 30)
+    with viewing(daemon.ready["control"]) as page:
+        follow(page, browser, "arm", daemon)
+        daemon.signal(signal.SIGSTOP)
+        try:
+            browser.until("document.getElementById('state').textContent.includes('it hangs')")
+            assert browser.run("document.body.classList.contains('absent')")
+            assert browser.run("document.getElementById('recalibrate').disabled")
+        finally:
+            daemon.signal(signal.SIGCONT)
+        browser.until("document.getElementById('state').textContent.startsWith('gestured ')")
+        browser.until("!document.getElementById('recalibrate').disabled")
+
+
+@pytest.mark.parametrize("then", [{"grid": [4, 4]}, {"time": 50.0}], ids=["another grid", "a clock set back"])
+def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
+    view: Page, browser: Browser, then: dict[str, object]
+) -> None:
+    browser.call("Page.navigate", url=view.whole)
+    browser.until("typeof state === 'object' && state.stream !== null")
+    first = {"time": 100.0, "grid": [9, 9], "centroid": None, "values": None, "phase": "IDLE", "noise": 1.0}
+    first |= {"activity": 1.0, "on": 6.0, "off": 3.0, "bad": []}
+    frames = [first, first | {"time": 101.0}, first | {"time": 102.0} | then]
+    kept = browser.run(f"state.frames = []; {json.dumps(frames)}.map(f => frame(f) ?? state.frames.length)")
+    assert kept == [1, 2, 1]
+    browser.run("new Promise(requestAnimationFrame)")
+    assert browser.complaints() == []
 
 
 def test_recalibrate_asks_before(sensor: Sensor, browser: Browser) -> None:
