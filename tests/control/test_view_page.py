@@ -368,6 +368,27 @@ def test_a_page_on_another_port_of_this_machine_gets_nothing(sensor: Sensor, vie
     browser.until("document.getElementById('sensor')?.options.length")  # the tab has kept its secret
 
 
+def test_the_longest_names_stick_out_of_no_telephone(serve, tmp_path: Path, browser: Browser) -> None:
+    name, gate, zone = ("n" * 64, "g" * 64, "z" * 64)
+    config = tmp_path / "long.toml"
+    config.write_text(f"[sensors.{name}.zones.{zone}]\nat = [0, 0, 1, 1]\n")
+    daemon = serve("--clock", "sensor", "--stale-s", 30, "--config", config)
+    with viewing(daemon.ready["control"]) as page:
+        sensor = follow(page, browser, name, daemon)
+        browser.size(400, 900)
+        with daemon.control() as control:
+            control.ask("inhibit", sensor=name, gate=gate)
+        perform(sensor, browser, "left")
+        browser.until(f"document.getElementById('name-note').textContent.includes('{gate}')")
+        browser.until(f"document.getElementById('listens').textContent.includes('{gate}')")
+        browser.run(f"at('zone-name').value = '{zone}'; over.pulled = [0, 0, 0.5, 0.5]; tellZone()")
+        wide = "e => e.getBoundingClientRect().right > 400 && !e.closest('.scroll')"
+        assert browser.run(f"[...document.querySelectorAll('body *')].filter({wide}).map(e => e.id)") == []
+        assert browser.run("document.documentElement.scrollWidth") <= 400
+        event = "document.querySelector('#events tbody td:nth-child(3)').getBoundingClientRect().left"
+        assert browser.run(event) < 400  # the table need not be moved to see what it was
+
+
 def test_a_name_is_never_markup(fake_control, browser: Browser) -> None:
     evil = "<img src=x onerror=document.title='owned'>"
     with viewing(fake_control(evil)) as page:

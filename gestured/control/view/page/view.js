@@ -97,7 +97,8 @@ function frame(told) {
   frames.push(told);
   while (frames.length && frames[0].time < told.time - KEPT_S) frames.shift();
   if (told.values) {
-    const most = frames.filter(f => f.centroid && f.values).map(f => Math.max(...f.values)).sort((a, b) => a - b);
+    told.peak = Math.max(...told.values); // once for each frame: half a minute of a large grid has millions of counts
+    const most = frames.filter(f => f.centroid && f.values).map(f => f.peak).sort((a, b) => a - b);
     const seen = Math.max(most[Math.floor((1 - OUTLIERS) * (most.length - 1))] ?? 0, 20 * told.noise);
     state.full = STEPS.find(step => step >= seen) ?? seen;
   }
