@@ -223,6 +223,9 @@ def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
             assert shown == "constructor (not heard so far)"
             assert browser.run("document.getElementById('listens').textContent") == "not heard so far"
             assert not browser.run(usable) and browser.run("document.body.classList.contains('absent')")
+            assert (
+                browser.run("getComputedStyle(document.getElementById('recalibrate')).opacity") != "1"
+            )  # and it shows
             before = browser.run("state.frames.length && state.frames[state.frames.length - 1].t")
             Sensor(daemon, "constructor").begin()
             browser.until(f"({usable}) && document.getElementById('listens').textContent === 'listens'")
@@ -246,6 +249,19 @@ def test_a_daemon_that_hangs_is_said_and_seen_again_by_itself(serve, browser: Br
             daemon.signal(signal.SIGCONT)
         browser.until("document.getElementById('state').textContent.startsWith('gestured ')")
         browser.until("!document.getElementById('recalibrate').disabled")
+
+
+def test_a_program_that_hangs_is_said_and_seen_again_by_itself(start, real: Daemon, browser: Browser) -> None:
+    process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0")
+    browser.call("Page.navigate", url=process.stdout.readline().decode().strip())
+    said = "document.getElementById('state')?.textContent"
+    browser.until(f"{said}?.startsWith('gestured ')")
+    process.send_signal(signal.SIGSTOP)
+    try:
+        browser.until(f"{said}.includes('does not answer')")
+    finally:
+        process.send_signal(signal.SIGCONT)
+    browser.until(f"{said}.startsWith('gestured ')")
 
 
 @pytest.mark.parametrize("then", [{"grid": [4, 4]}, {"time": 50.0}], ids=["another grid", "a clock set back"])
