@@ -12,7 +12,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
 from gestured.core.idle import QUIETER
@@ -168,27 +167,6 @@ def test_the_noise_is_what_an_idle_taxel_shows(rate: float, noise: float, level:
             shown = float(np.median(counts.std(axis=0)))
             assert events == [] and front_end.bad_taxels == 0
             assert shown / 1.5 < front_end.noise < max(shown, step) * 1.5  # below one step it cannot be known
-
-
-@given(
-    shape=st.tuples(st.integers(2, 20), st.integers(2, 20)),
-    seed=st.integers(0, 999),
-    exponent=st.integers(-30, 30),
-    coarse=st.booleans(),
-)
-def test_activity_is_the_strongest_spot_beyond_what_all_taxels_share(
-    shape: Shape, seed: int, exponent: int, coarse: bool
-) -> None:
-    scaled = np.random.default_rng(seed).normal(1, 4, shape) * 10.0**exponent
-    scaled = np.rint(scaled) if coarse else scaled
-    side, middle, _ = BLOB
-    rows, columns = (middle * np.eye(n) + side * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in shape)
-    spots = rows @ scaled @ columns / sum(b * b for b in BLOB)
-    common = np.clip(np.sort(scaled, axis=None)[scaled.size // 2], -COMMON, COMMON)
-    expected = max(scaled.max() - common, spots.max() - common * BLOB_GAIN)
-    activity, lowest = Activity(*shape).measure(scaled.ravel())
-    assert activity == pytest.approx(expected, rel=1e-9, abs=1e-9 * abs(scaled).max())
-    assert lowest == scaled.min()
 
 
 def test_the_noise_follows_a_sensor_that_becomes_noisier() -> None:

@@ -464,10 +464,6 @@ def test_a_ladder_that_is_slow_is_not_asked_early_for_a_while() -> None:
 SCENE = Scene(("one_tap", "double_tap", "left", "right"), (9, 9))
 
 
-def packets(hand: Hand, *parts: Sequence[Any]) -> list[Any]:
-    return [frame for part in parts for frame in part]
-
-
 def feed(hub: Hub, name: str, stream: Sequence[Any], t: float) -> list[Any]:
     facts = []
     for n, frame in enumerate(stream, start=1):

@@ -303,19 +303,6 @@ def test_what_is_collected_falls_silent_as_in_the_daemon(live: LiveSensor, monke
     assert [type(one) for one in live.found] == [Onset, Cancelled, Release] and not live.touched
 
 
-def test_what_cannot_be_is_named() -> None:
-    for changes, said in (
-        ({"gestures": ()}, "gestures"),
-        ({"grid": (1, 9)}, "grid"),
-        ({"sensors": {"arm": Setup(grid=(9, 65))}}, "grid"),
-        ({"clock": "wall"}, "clock"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            replace(SCENE, **changes)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="wave"):
-        Hub(replace(SCENE, gestures=("wave",)), Sure())
-
-
 def test_another_scene_keeps_what_was_learned_where_it_holds() -> None:
     hand = Hand()
     hub = Hub(replace(SCENE, frames=False), Sure())

@@ -3,11 +3,9 @@
 from itertools import pairwise
 from pathlib import Path
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.core import segmenter as core_segmenter
 from gestured.core.segmenter import (
     CONTACT,
     GAP,
@@ -18,7 +16,6 @@ from gestured.core.segmenter import (
     Action,
     Deed,
     Phase,
-    Row,
     Segmenter,
     Signal,
 )
@@ -83,40 +80,3 @@ def test_when_something_is_decided_changes_nothing_that_is(stream: Stream, wait:
     late, soon = deeds(stream, wait), deeds(stream, wait, sure_s)
     assert [deed[:3] for deed in soon] == [deed[:3] for deed in late]
     assert all(deed.offset <= one.decided <= deed.decided for one, deed in zip(soon, late, strict=True))
-
-
-def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = {(IDLE, Signal.QUIET)}  # of all rows the most frequent: `push` does not look it up
-    assert TRANSITIONS[IDLE, Signal.QUIET] == (IDLE, None, None)
-
-    class Watched(dict[tuple[Phase, Signal], Row]):
-        def __getitem__(self, key: tuple[Phase, Signal]) -> Row:
-            seen.add(key)
-            return TRANSITIONS[key]
-
-    monkeypatch.setattr(core_segmenter, "TRANSITIONS", Watched(TRANSITIONS))
-
-    def frames(count: int, activity: float, step: float = 1 / 15) -> Stream:
-        return [(step, activity, (4.0, 4.0))] * count
-
-    idle, tap, weak, quiet, held = frames(1, 5.0), frames(3, 50.0), frames(1, 8.0), frames(3, 0.0), frames(90, 50.0)
-    for stream in (
-        idle + tap + weak + frames(1, 0.0) + tap + frames(1, 0.0) + weak + quiet,  # a flicker
-        tap + quiet + weak + frames(12, 0.0),  # a tap
-        tap + quiet + tap + quiet,  # a double tap
-        tap + quiet + [(1 / 15, 50.0, (4.0, float(n))) for n in range(6)] + quiet,  # a tap, then a swipe
-        held + frames(1, 0.0) + held + quiet,  # held too long
-        frames(9, 15.0) + tap + frames(9, 15.0),  # a tap beside what lies there faintly
-        frames(51, 50.0, 0.1) + frames(3, 0.0, 0.02),  # let go just before that
-        tap + quiet + frames(1, 0.0, 6.0),  # no frame for so long
-    ):
-        play(stream)
-    waiting = Segmenter(81, 0.15 * 9)
-    for n, activity in enumerate([50.0] * 3 + [0.0] * 3):
-        waiting.wait(n / 15, 0.0)
-        waiting.push(n / 15, activity, (4.0, 4.0))
-    assert [deed.action for deed in waiting.give_up(0.4)] == [
-        Action.HELD
-    ]  # a tap whose second one never comes, by a clock that stands still
-    # What lies there after a contact was given up counts as touched down to `off`: it is never weak.
-    assert seen == set(TRANSITIONS) - {(SPENT, Signal.WEAK)}

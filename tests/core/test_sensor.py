@@ -4,10 +4,8 @@ Streams are written as in tests/scenarios; times are written down.
 """
 
 import math
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,13 +16,12 @@ from hypothesis import strategies as st
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
-from gestured.core.facts import Decided, events_of
+from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
+from gestured.core.front_end import Cut, Found, FrontEnd, Void
 from gestured.core.points import STRICTNESS, Point
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
-from gestured.core.timing import Timing
 from gestured.core.window import Window
 from tests.scenario import contacts, frames
 
@@ -125,22 +122,6 @@ def cut_late(stream: Sequence[Frame]) -> list[Segment]:
         return [x.segment for x in cut_out(stream) if isinstance(x, Cut)]
 
 
-@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP), (TAP, "quiet for 150ms", SWIPE)])
-def test_a_draft_comes_before_its_cut_and_is_the_same_segment(lines: tuple[str, ...]) -> None:
-    front_end = FrontEnd(9, 9)
-    drafts: list[Segment] = []
-    cuts = 0
-    for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms"):
-        for found in front_end.push(frame):
-            if isinstance(found, Segment):
-                drafts.append(found)
-            elif isinstance(found, Cut):
-                cuts += 1
-                assert any(draft is found.segment for draft in drafts)
-    assert cuts == 2 * (2 if lines[-1] == SWIPE and len(lines) > 1 else 1)
-    assert all(one.offset < other.offset for one, other in pairwise(drafts))  # each was told once
-
-
 @pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP)])
 def test_no_frame_changes_what_the_time_has_decided(lines: tuple[str, ...]) -> None:
     """A finger that comes back in the very frame that is due comes too late, and begins anew."""
@@ -162,25 +143,6 @@ def test_no_frame_changes_what_the_time_has_decided(lines: tuple[str, ...]) -> N
 def touch_of(stream: Sequence[Frame]) -> float:
     """When the last contact of a stream was touched last, in s."""
     return max(x.segment.offset for x in cut_out(stream) if isinstance(x, Cut))
-
-
-def test_what_was_decided_follows_its_event() -> None:
-    classifier = Fake([SURE, says(0.2, 0.2, 0.2)])
-    subject = recognizer(classifier)
-    found = [one for frame in swipes(2) for one in subject.push(frame)]
-    kinds = [type(one).__name__ for one in found]
-    assert kinds == ["Onset", "Gesture", "Decided", "Release", "Onset", "Unknown", "Decided", "Release"]
-    decided = [one for one in found if isinstance(one, Decided)]
-    assert [one.known for one in decided] == [True, False]
-    assert all(one.segment is seen for one, seen in zip(decided, classifier.seen, strict=True))
-
-
-def test_what_was_answered_is_not_kept() -> None:
-    classifier = Fake()
-    subject = recognizer(classifier)
-    assert answers(run(subject, frames("quiet for 1500ms", SWIPE, "quiet for 900ms")))
-    held = weakref.ref(classifier.seen.pop().frames)
-    assert held() is None
 
 
 # --- what nobody saw
@@ -262,12 +224,6 @@ def test_a_touch_as_soon_as_the_sensor_is_ready_has_no_hole() -> None:
         for line in (SWIPE, TAP):
             kinds += map(type, answers(run(recognizer(Fake()), frames(f"quiet for {ms}ms", line, "quiet for 900ms"))))
     assert len(kinds) > 30 and set(kinds) == {Gesture}
-
-
-def test_a_slow_sensor_has_no_holes() -> None:
-    stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
-    (answer,) = answers(run(recognizer(Fake()), stream))
-    assert isinstance(answer, Gesture)
 
 
 def test_a_slow_sensor_may_show_the_same_twice_before_it_is_touched() -> None:
@@ -426,16 +382,6 @@ def test_the_sequence_counts_gestures_only_and_has_no_gaps(given_: list[Scores |
         assert onset.id == answer.id == release.id == number  # type: ignore[union-attr]
 
 
-def test_the_classifier_may_be_replaced_between_frames() -> None:
-    subject = recognizer(Fake())
-    stream = swipes(1)
-    middle = next(n for n, frame in enumerate(stream) if frame.t > 1.7)
-    assert [type(event) for event in run(subject, stream[:middle])] == [Onset]
-    subject.classifier = Fake([says(0, 0, 1)])
-    (answer,) = answers(run(subject, stream[middle:]))
-    assert isinstance(answer, Gesture) and answer.gesture == "right" and answer.sequence == 1
-
-
 def test_another_strictness_holds_from_the_next_answer_on() -> None:
     at = {"eager": 0.2, "strict": 0.95}
     points = {name: Point(dict.fromkeys(GESTURES, least), None, 0, 0, 1) for name, least in at.items()}
@@ -503,17 +449,6 @@ def test_a_reset_cancels_what_is_open_and_starts_clean(what: str) -> None:
     assert onset.id == gesture.id == release.id == len(ids[Onset]) + 1  # type: ignore[union-attr]
 
 
-def test_a_stream_that_was_flushed_goes_on() -> None:
-    """Ids and sequence go on, and the sensor need not be learned again."""
-    subject = recognizer(Fake())
-    stream = swipes(1)
-    run(subject, stream)
-    assert subject.flush(stream[-1].t + 1) == []
-    again = [replace(frame, t=frame.t + 60) for frame in stream if frame.t > 1.3]
-    onset, gesture, release = run(subject, again)
-    assert isinstance(gesture, Gesture) and (gesture.id, gesture.sequence) == (2, 2)
-
-
 # --- waits
 
 
@@ -538,19 +473,6 @@ def test_only_a_tap_waits_and_only_for_a_second_one(seed: int) -> None:
     assert len(decided_after(twice, wait_for_double_tap=False)) == 2
     ((waited, _),) = decided_after(frames("quiet for 1500ms", SWIPE, "quiet for 1s", seed=seed))
     assert 0.1 <= waited <= 0.1 + 2 * frame + margin
-
-
-def test_the_times_are_settings() -> None:
-    tapped = frames("quiet for 1500ms", TAP, "quiet for 1500ms")
-    ((waited, _),) = decided_after(tapped, timing=Timing(tap_gap_s=1.0))
-    assert 1.0 <= waited < 1.14
-    ((waited, _),) = decided_after(tapped, timing=Timing(tap_gap_s=0.3, release_s=0.2))
-    assert 0.3 <= waited < 0.44
-    held = frames("quiet for 1500ms", "press 4,4 0.8 for 2s", "quiet for 1s")
-    front_end = FrontEnd(9, 9, timing=Timing(limit_s=1.0))
-    events = [event for frame in held for event in contacts(front_end, frame)]
-    assert [type(event) for event in events] == [Opened, Void, Ended]
-    assert events[1].reason == "held"  # type: ignore[union-attr]
 
 
 # --- silences

@@ -4,8 +4,6 @@ import json
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Gesture, Onset, Place, Release, Status, Where
@@ -82,16 +80,3 @@ def test_requests_that_are_none_are_answered_with_what_was_expected(line: bytes,
         parse_subscription(line, KNOWN)
     assert caught.value.reason == "subscription" and says in str(caught.value)
     json.loads(error_json(str(caught.value)))
-
-
-keys = st.sampled_from(["subscribe", "types", "sensors", "x"])
-leaves = st.none() | st.booleans() | st.floats() | st.text(max_size=5) | st.just("gesture")
-trees = st.recursive(leaves, lambda x: st.lists(x, max_size=3) | st.dictionaries(keys, x, max_size=3))
-
-
-@given(st.binary(max_size=60) | trees.map(lambda x: json.dumps(x).encode()))
-def test_any_line_is_a_subscription_or_a_protocol_error(line: bytes) -> None:
-    try:
-        assert isinstance(parse_subscription(line, KNOWN), Subscription)
-    except ProtocolError as error:
-        assert error.reason == "subscription"

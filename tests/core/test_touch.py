@@ -285,13 +285,3 @@ def test_a_bug_in_the_path_of_a_sensor_ends_its_fingers_first(monkeypatch: pytes
     ended = [one for one in facts if isinstance(one, Fault | Touch | Cancelled | Release)][-4:]
     assert [type(one) for one in ended] == [Fault, Touch, Cancelled, Release]
     checked([one for one in facts if isinstance(one, Onset | Touch | Cancelled | Release)])
-
-
-def test_who_asks_in_the_middle_of_a_contact_gets_its_fingers_and_who_leaves_gets_their_end() -> None:
-    hand = Hand(sensor(asked=False))
-    assert hand.does(0.5, line(2, 3)) == []
-    hand.subject.follow([], asked=True)
-    assert [one.phase for one in hand.does(0.2, line(3, 4))] == ["down", "move", "move"]
-    facts: list[Any] = []
-    hand.subject.follow(facts, asked=False)
-    assert [one.phase for one in facts] == ["up"] and hand.does(0.5, line(4, 5)) == []

@@ -21,7 +21,7 @@ from gestured.core.sensor import Sensor
 from gestured.core.spots import Spot
 from gestured.core.spots import spots as spots_in
 from gestured.core.where import where as where_in
-from tests.core.test_sensor import SWIPE, TAP, Fake, says
+from tests.core.test_sensor import SWIPE, Fake, says
 from tests.scenario import frames
 
 Array = NDArray[np.float64]
@@ -191,11 +191,6 @@ def test_an_answer_says_that_its_way_led_over_a_bad_taxel_and_is_as_long_as_with
     over, beside = told(SWIPE, dead=(4, 4)), told(SWIPE, dead=(8, 4))
     assert (over.bridged, beside.bridged) == (1, 0)
     assert over.way == pytest.approx(beside.way, abs=0.05) and over.contacts == 1
-
-
-def test_a_tap_has_no_way() -> None:
-    found = told(TAP)  # at 4,4
-    assert found.way == 0.0 and (found.start.x, found.start.y) == pytest.approx((0.5, 0.5), abs=0.05)
 
 
 def test_places_are_as_a_person_in_front_of_the_sensor_sees_them() -> None:

@@ -217,17 +217,6 @@ def test_good_messages_survive_bad_siblings() -> None:
     assert sorted(e.reason for e in errors) == ["not_finite", "not_finite", "size", "types"]
 
 
-@given(st.binary(max_size=100), st.integers(0, 200))
-def test_whatever_arrives_nothing_is_raised_and_the_stream_goes_on(junk: bytes, at: int) -> None:
-    decode = decoder()
-    packet = encoding.bundle([pressure([1.0] * SIZE, 1), trajectory((1, 1.0, 2.0))])
-    for damaged in (junk, packet[:at] + junk, packet[:at] + junk + packet[at + len(junk) :]):
-        for error in decode.decode(damaged)[1]:
-            assert error.reason.isidentifier()
-    arrivals, errors = decode.decode(packet)
-    assert len(arrivals) == 1 and errors == []
-
-
 def test_invented_addresses_cost_no_memory() -> None:
     decode = decoder()
     for n in range(2000):
@@ -316,13 +305,6 @@ def _any_packet(rng: np.random.Generator, sensor: str, grid: tuple[int, int], fo
     return packet if form == 3 else encoding.bundle([packet, *touches], float(rng.integers(1, 2**31)))
 
 
-def test_touches_nobody_wants_are_passed_over() -> None:
-    decode = decoder(keep_touches=False)
-    packet = encoding.bundle([FRAME, FINGER, encoding.message("/s/trajectory", "if", (1, 1.0))])
-    (arrival,), errors = decode.decode(packet)
-    assert arrival.touches == () and errors == []
-
-
 def test_time_tags_are_not_mixed_up_where_packets_have_one_length() -> None:
     """A bundle's head takes 20 bytes, as much as a name may be longer in a packet that is in no bundle."""
     decode, values = decoder(keep_touches=False), np.ones(GRID[0] * GRID[1])
@@ -333,9 +315,3 @@ def test_time_tags_are_not_mixed_up_where_packets_have_one_length() -> None:
         expected = [arrival.timetag for packet in each for arrival in decode.decode(packet)[0]]
         read = {n: block.arrival(k) for block in decode.together(each) for k, n in enumerate(block.packets)}
         assert [read[n].timetag for n in range(8)] == expected
-
-
-def test_a_frame_carries_the_time_tag_of_its_bundle() -> None:
-    (arrival,), _ = decoder().decode(encoding.bundle([FRAME], 1_700_000_000.5))
-    assert arrival.timetag == 1_700_000_000.5
-    assert one(FRAME).timetag is None
