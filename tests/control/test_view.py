@@ -44,6 +44,15 @@ def test_the_command_prints_the_address_and_stands_back_for_the_daemon(start, re
     assert niceness == min(os.getpriority(os.PRIO_PROCESS, 0) + NICE, 19)
 
 
+def test_the_folder_for_what_is_flagged_is_made_before_anything_is(start, run, real: Daemon, tmp_path: Path) -> None:
+    flags = ("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0", "--folder")
+    assert start(*flags, tmp_path / "new" / "flagged").stdout.readline()
+    assert (tmp_path / "new" / "flagged").is_dir()
+    (tmp_path / "file").touch()
+    status, out, err = run(*flags, tmp_path / "file")
+    assert (status, out) == (1, "") and f"--folder {tmp_path / 'file'}" in err
+
+
 def test_the_browser_of_the_bench_sees_what_a_page_would(real: Daemon, arm: str) -> None:
     sensor = Sensor(real, arm).begin()
     sensor.send([sensor.hand.frame()])

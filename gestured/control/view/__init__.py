@@ -29,7 +29,11 @@ def add(commands: Commands) -> None:
     text = f"where the page is served, a loopback address (default: {DEFAULT}; port 0: any)"
     parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
     parser.add_argument(
-        "--folder", type=Path, default=Path(), metavar="FOLDER", help="folder for flagged recordings (default: .)"
+        "--folder",
+        type=Path,
+        default=Path(),
+        metavar="FOLDER",
+        help="folder for flagged recordings, made where there is none (default: .)",
     )
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the address as JSON")
@@ -46,6 +50,10 @@ def run(args: argparse.Namespace) -> int:
     if not is_loopback(args.listen.host):
         raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
     connect(args).close()  # who has no daemon, is told so at once
+    try:
+        args.folder.mkdir(parents=True, exist_ok=True)  # not once something was wrong, and is to be kept
+    except OSError as error:
+        raise GesturedError(f"--folder {args.folder}: cannot be made: {error.strerror}") from error
     os.nice(NICE)
     source = Source(control_path(args), args.folder)
     door = Door("gesturectl view")
