@@ -4,6 +4,7 @@ import http.client
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -67,8 +68,9 @@ class Stream:
 
     def until(self, *kinds: str) -> tuple[str, dict[str, Any]]:
         """The next event of one of these kinds."""
-        kind = ""
+        kind, end = "", time.monotonic() + DEADLINE_S
         while line := self._file.readline().decode():
+            assert time.monotonic() < end, f"none of {kinds} came"
             if line.startswith("event: "):
                 kind = line[7:].strip()
             elif line.startswith("data: ") and kind in kinds:

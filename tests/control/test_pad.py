@@ -2,6 +2,7 @@
 
 import json
 import math
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -228,6 +229,22 @@ def test_where_nobody_listens_the_page_is_told() -> None:
         stream, _ = seat(page.come_in())
         while stream.until("frame")[1]["heard"]:
             pass
+
+
+def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(serve) -> None:
+    daemon = serve()
+    pad = Pad(daemon.address, "pad", (9, 9), 15.0)
+    with PadServer(Address("127.0.0.1", 0), pad, "gesturectl pad").serve(daemon.socket) as server:
+        stream, _ = seat(Page(server.page).come_in())
+        daemon.signal(signal.SIGSTOP)
+        try:
+            for _ in range(2):  # a page that is opened meanwhile is told, too
+                assert "hangs" in stream.until("gone")[1]["reason"]
+        finally:
+            daemon.signal(signal.SIGCONT)
+        stream.until("back")
+        daemon.stop()
+        assert "no daemon on" in stream.until("gone")[1]["reason"]
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0", "0:0"])

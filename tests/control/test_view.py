@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import socket
 from email.message import Message
 from pathlib import Path
@@ -257,6 +258,30 @@ def test_it_waits_for_a_daemon_that_starts_again(tmp_path: Path) -> None:
             assert stream.until("sensors")[1]["state"] == "no_data"
         finally:
             second.stop()
+
+
+def test_a_daemon_that_hangs_is_said_to_and_heard_again(serve) -> None:
+    daemon = serve()
+    with viewing(daemon.ready["control"]) as page:
+        stream = page.come_in().stream()
+        stream.until("sensors")
+        daemon.signal(signal.SIGSTOP)
+        try:
+            for _ in range(2):  # while it is asked, and when it is called again
+                assert "it hangs" in stream.until("gone")[1]["reason"]
+        finally:
+            daemon.signal(signal.SIGCONT)
+        stream.until("sensors")
+
+
+def test_who_comes_after_the_daemon_has_gone_is_not_told_how_it_was(tmp_path: Path) -> None:
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
+    with viewing(daemon.ready["control"]) as page:
+        first = page.come_in().stream()
+        first.until("sensors")
+        daemon.stop()
+        first.until("gone")
+        assert page.stream().until("sensors", "gone")[0] == "gone"
 
 
 @pytest.mark.parametrize("wrong", [{"model": "x"}, {"type": 1}, {"type": "view"}, {"type": "view", "sensor": []}])

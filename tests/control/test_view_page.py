@@ -1,6 +1,8 @@
 """The page of `gesturectl view` in a real browser."""
 
+import json
 import re
+import signal
 import threading
 import tomllib
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -199,6 +201,84 @@ def _is_told(page: Page, daemon: Daemon, browser: Browser) -> None:
     browser.until("document.body.classList.contains('absent')")  # what is shown is of before
 
 
+def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
+    model: Path, tmp_path: Path, browser: Browser
+) -> None:
+    flags = ("--clock", "sensor", "--stale-s", 30)
+    daemon = Daemon.start(tmp_path, model, *flags)
+    with viewing(daemon.ready["control"]) as page:
+        follow(page, browser, "constructor", daemon)  # as everything in JavaScript has one
+        usable = "['recalibrate', 'gate'].every(id => !document.getElementById(id).disabled)"
+        browser.until(usable)
+        daemon.stop()
+        browser.until("document.body.classList.contains('absent')")
+        assert not browser.run(usable) and browser.run("document.getElementById('listens').textContent") == ""
+        daemon = Daemon.start(tmp_path, model, *flags)
+        try:
+            Sensor(daemon, "another").begin()
+            browser.until("document.getElementById('sensor').options.length === 2")
+            chosen = browser.run("[document.getElementById('sensor').value, state.sensor]")
+            assert chosen == ["constructor", "constructor"]
+            shown = browser.run("document.getElementById('sensor').selectedOptions[0].text")
+            assert shown == "constructor (not heard so far)"
+            assert browser.run("document.getElementById('listens').textContent") == "not heard so far"
+            assert not browser.run(usable) and browser.run("document.body.classList.contains('absent')")
+            assert (
+                browser.run("getComputedStyle(document.getElementById('recalibrate')).opacity") != "1"
+            )  # and it shows
+            before = browser.run("state.frames.length && state.frames[state.frames.length - 1].t")
+            Sensor(daemon, "constructor").begin()
+            browser.until(f"({usable}) && document.getElementById('listens').textContent === 'listens'")
+            browser.until(f"state.frames[state.frames.length - 1].t !== {before}")
+            assert browser.run("document.getElementById('sensor').selectedOptions[0].text") == "constructor"
+        finally:
+            daemon.stop()
+    assert not [said for said in browser.complaints() if "Exception" in said]
+
+
+def test_a_daemon_that_hangs_is_said_and_seen_again_by_itself(serve, browser: Browser) -> None:
+    daemon = serve("--stale-s", 30)
+    with viewing(daemon.ready["control"]) as page:
+        follow(page, browser, "arm", daemon)
+        daemon.signal(signal.SIGSTOP)
+        try:
+            browser.until("document.getElementById('state').textContent.includes('it hangs')")
+            assert browser.run("document.body.classList.contains('absent')")
+            assert browser.run("document.getElementById('recalibrate').disabled")
+        finally:
+            daemon.signal(signal.SIGCONT)
+        browser.until("document.getElementById('state').textContent.startsWith('gestured ')")
+        browser.until("!document.getElementById('recalibrate').disabled")
+
+
+def test_a_program_that_hangs_is_said_and_seen_again_by_itself(start, real: Daemon, browser: Browser) -> None:
+    process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0")
+    browser.call("Page.navigate", url=process.stdout.readline().decode().strip())
+    said = "document.getElementById('state')?.textContent"
+    browser.until(f"{said}?.startsWith('gestured ')")
+    process.send_signal(signal.SIGSTOP)
+    try:
+        browser.until(f"{said}.includes('does not answer')")
+    finally:
+        process.send_signal(signal.SIGCONT)
+    browser.until(f"{said}.startsWith('gestured ')")
+
+
+@pytest.mark.parametrize("then", [{"grid": [4, 4]}, {"time": 50.0}], ids=["another grid", "a clock set back"])
+def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
+    view: Page, browser: Browser, then: dict[str, object]
+) -> None:
+    browser.call("Page.navigate", url=view.whole)
+    browser.until("typeof state === 'object' && state.stream !== null")
+    first = {"time": 100.0, "grid": [9, 9], "centroid": None, "values": None, "phase": "IDLE", "noise": 1.0}
+    first |= {"activity": 1.0, "on": 6.0, "off": 3.0, "bad": []}
+    frames = [first, first | {"time": 101.0}, first | {"time": 102.0} | then]
+    kept = browser.run(f"state.frames = []; {json.dumps(frames)}.map(f => frame(f) ?? state.frames.length)")
+    assert kept == [1, 2, 1]
+    browser.run("new Promise(requestAnimationFrame)")
+    assert browser.complaints() == []
+
+
 def test_recalibrate_asks_before(sensor: Sensor, browser: Browser) -> None:
     for answer in ("false", "true"):
         assert browser.run("document.getElementById('done').textContent") == ""
@@ -302,6 +382,27 @@ def test_a_page_on_another_port_of_this_machine_gets_nothing(sensor: Sensor, vie
     assert heard and not any(secret in what or "Cookie" in what for what in heard)
     browser.call("Page.navigate", url=f"http://{view.address}/")
     browser.until("document.getElementById('sensor')?.options.length")  # the tab has kept its secret
+
+
+def test_the_longest_names_stick_out_of_no_telephone(serve, tmp_path: Path, browser: Browser) -> None:
+    name, gate, zone = ("n" * 64, "g" * 64, "z" * 64)
+    config = tmp_path / "long.toml"
+    config.write_text(f"[sensors.{name}.zones.{zone}]\nat = [0, 0, 1, 1]\n")
+    daemon = serve("--clock", "sensor", "--stale-s", 30, "--config", config)
+    with viewing(daemon.ready["control"]) as page:
+        sensor = follow(page, browser, name, daemon)
+        browser.size(400, 900)
+        with daemon.control() as control:
+            control.ask("inhibit", sensor=name, gate=gate)
+        perform(sensor, browser, "left")
+        browser.until(f"document.getElementById('name-note').textContent.includes('{gate}')")
+        browser.until(f"document.getElementById('listens').textContent.includes('{gate}')")
+        browser.run(f"at('zone-name').value = '{zone}'; over.pulled = [0, 0, 0.5, 0.5]; tellZone()")
+        wide = "e => e.getBoundingClientRect().right > 400 && !e.closest('.scroll')"
+        assert browser.run(f"[...document.querySelectorAll('body *')].filter({wide}).map(e => e.id)") == []
+        assert browser.run("document.documentElement.scrollWidth") <= 400
+        event = "document.querySelector('#events tbody td:nth-child(3)').getBoundingClientRect().left"
+        assert browser.run(event) < 400  # the table need not be moved to see what it was
 
 
 def test_a_name_is_never_markup(fake_control, browser: Browser) -> None:

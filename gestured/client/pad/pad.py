@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from gestured.client.pad.contacts import Contacts
 from gestured.client.sensor import Form, Sensor
+from gestured.client.subscriber import Subscriber
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
@@ -37,11 +38,15 @@ class Pad:
         self._textile = LiveTextile(sensor, time.time_ns())
         self._sender = Sensor(to, Form(name))
 
-    def begin(self, tell: Tell, events: Iterable[dict[str, Any]] = ()) -> None:
-        """Send frames from now on; the page is told them, and events, as they come."""
+    def begin(self, tell: Tell, events: Subscriber | None = None) -> None:
+        """Send frames from now on; the page is told them, and events, as they come.
+
+        `events` has the status among its types, and a timeout that is longer than the second between two of them.
+        """
         self._tell = tell
         threading.Thread(target=self._send, daemon=True).start()
-        threading.Thread(target=self._hear, args=(events,), daemon=True).start()
+        if events is not None:
+            threading.Thread(target=self._hear, args=(events,), daemon=True).start()
 
     def close(self) -> None:
         """Send nothing more."""
@@ -57,12 +62,27 @@ class Pad:
                     self._tell("gone", {"reason": f"cannot send to {self.to}: {error.strerror or error}"})
                 stop.wait(AGAIN_S)
 
-    def _hear(self, events: Iterable[dict[str, Any]]) -> None:
-        try:
-            for event in events:
-                self._tell("event", event)
-        except GesturedError as error:
-            self._tell("gone", {"reason": str(error)})
+    def _hear(self, events: Subscriber) -> None:
+        gone = False
+        while not self._sender.stop.is_set():
+            try:
+                event = next(events)
+            except TimeoutError:
+                gone = True
+                hangs = f"the daemon on {events.path} hangs, or the machine is very busy"
+                absent = f"no daemon on {events.path}: start gestured, or name its --socket"
+                self._tell("gone", {"reason": f"No names: {hangs if events.connected else absent}"})
+            except StopIteration:
+                return
+            except GesturedError as error:
+                self._tell("gone", {"reason": str(error)})
+                return
+            else:
+                if gone:
+                    gone = False
+                    self._tell("back", {})
+                if event["type"] != "status":
+                    self._tell("event", event)
 
     def _frames(self) -> Iterator[tuple[int, Frame]]:
         """Each frame at its time; those for which the machine had no time are left out, and their counts are lost."""

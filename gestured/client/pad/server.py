@@ -22,7 +22,8 @@ MESSAGES = 120  # a second
 IDLE_S = 600.0  # without a touch; then the address has ended
 SAID = 1000  # characters
 DEFAULT = Address("127.0.0.1", 9110)
-HEARD = ("onset", "provisional", "gesture", "unknown", "cancelled")  # events that the page shows
+HEARD = ("onset", "provisional", "gesture", "unknown", "cancelled", "status")  # the status says that it lives
+SILENT_S = 4.0  # without a word; a daemon tells its status each second
 
 
 class PadServer(Server):
@@ -48,7 +49,8 @@ class PadServer(Server):
 
     def serve(self, *sockets: Path) -> Self:
         """Serve from now on, in threads; the page is told the sensor's events by the daemon with this event socket."""
-        self.pad.begin(self.tell, Subscriber(*sockets, types=HEARD, sensors=[self.pad.name]) if sockets else ())
+        events = Subscriber(*sockets, types=HEARD, sensors=[self.pad.name], timeout=SILENT_S) if sockets else None
+        self.pad.begin(self.tell, events)
         threading.Thread(target=self.serve_forever, daemon=True).start()
         return self
 

@@ -1,6 +1,7 @@
 """What the page shows, as the daemon tells who looks on: its state each second, frames of what is looked at, events."""
 
 import threading
+from collections.abc import Iterator
 from dataclasses import asdict
 from itertools import takewhile
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.fields import wrong_field
-from gestured.client.lines import Refused
+from gestured.client.lines import Refused, Unreachable
 from gestured.client.web.outbox import Outbox
 from gestured.control.findings import examine_sensors
 from gestured.control.flag import flag, flag_path
@@ -17,6 +18,7 @@ from gestured.core.errors import GesturedError
 
 GATE = "view"  # the page's own
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
+SILENT_S = 4.0  # for an answer, and between lines: a daemon tells its state each second
 
 Looked = tuple[list[str], bool] | None  # sensors, and whether with their counts as they were sent; None: nobody looks
 
@@ -98,9 +100,10 @@ class Source:
             with self._changed:
                 self._changed.wait_for(lambda: self._open or self._closed.is_set())
             try:
-                with Control(self._control) as control:
+                with Control(self._control, SILENT_S) as control:
                     self._look(control)
             except (GesturedError, OSError) as error:
+                self._state = {}  # who comes meanwhile is not told how it was
                 self._tell("gone", {"reason": str(error)})
                 self._closed.wait(AGAIN_S)
 
@@ -115,7 +118,7 @@ class Source:
         with self._changed:
             self._looking, self._looked_at = control, looked_at
             self._look_anew()
-        for line in control.lines():
+        for line in self._lines(control):
             try:
                 words = wrong_field(line)
                 if words is None:
@@ -124,6 +127,15 @@ class Source:
                 words = f"a line of the type {line['type']!r} without its fields"
             if words is not None:
                 raise Refused(f"{self._control} says something that gestured does not say: {words}")
+
+    def _lines(self, control: Control) -> Iterator[dict[str, Any]]:
+        """What the daemon streams. Raises Unreachable where it stops to, without hanging up."""
+        control.socket.settimeout(SILENT_S)
+        try:
+            yield from control.lines()
+        except TimeoutError:
+            said = f"has said nothing for {SILENT_S:g} s: it hangs, or the machine is very busy"
+            raise Unreachable(f"the daemon on {self._control} {said}") from None
 
     def _pass_on(self, line: dict[str, Any]) -> None:
         """A line of the daemon, to whoever looks at what it is about."""

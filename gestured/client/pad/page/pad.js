@@ -138,5 +138,5 @@ for (const kind of ["pointerdown", "pointermove"]) pad.addEventListener(kind, to
 for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(kind, left);
 pad.addEventListener("contextmenu", e => e.preventDefault());
 addEventListener("resize", plan);
-const kinds = { seat, frame, event, told, over, gone: gone => status(gone.reason, true) };
+const kinds = { seat, frame, event, told, over, gone: gone => status(gone.reason, true), back: () => state.seat && sends() };
 enter().then(() => listen("stream", state.stream.signal, kinds, reason => status(reason, true)), error => status(error.message, true));

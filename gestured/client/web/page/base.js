@@ -2,6 +2,7 @@
 // What the pages of gestured share. What comes from a server is written by textContent alone: a name is never markup.
 const at = id => document.getElementById(id);
 const CIVIDIS = ["#00204d", "#31446b", "#666970", "#958f78", "#cab969", "#ffea46"];
+const SILENT_MS = 12000;
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const door = { secret: sessionStorage.getItem("secret") ?? "", token: location.hash.slice(1) };
 let stops; // colours from nothing, which is the page's own ground, to the most
@@ -26,13 +27,18 @@ async function enter() { // throws the reason where the door is closed
   sessionStorage.setItem("secret", door.secret = told.secret);
 }
 
+async function heardOf(reader) { // what comes next; the end where nothing does, since a server that lives says so each 5 s
+  const late = setTimeout(() => reader.cancel().catch(() => {}), SILENT_MS);
+  return reader.read().finally(() => clearTimeout(late));
+}
+
 async function listen(path, signal, hear, lost) { // server-sent events; EventSource sends no header
   while (!signal.aborted) {
     try {
       const answer = await ask(path, { signal });
       if (!answer.ok) { lost(await answer.text()); return; }
       const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
-      for (let rest = "", part; !(part = await reader.read()).done;) {
+      for (let rest = "", part; !(part = await heardOf(reader)).done;) {
         const blocks = (rest + part.value).split("\n\n");
         rest = blocks.pop();
         for (const block of blocks) {

@@ -29,7 +29,9 @@ function open(sensor) {
 function daemon(text, gone) {
   at("state").textContent = text;
   at("state").classList.toggle("gone", gone);
-  if (gone) { absent(true); rest(); }
+  if (!gone) return;
+  absent(true); rest(); heard(null, "");
+  at("flag").disabled = true;
 }
 
 function rest() { state.sliders = [slider(at("absolute"), false), slider(at("relative"), true)]; } // no finger moves them
@@ -38,7 +40,7 @@ function absent(is) { document.body.classList.toggle("absent", is); } // what is
 
 function sensors(told) {
   daemon(`gestured ${told.version}, ${told.state}, model ${told.model}`, false);
-  const names = Object.keys(told.sensors), select = at("sensor"), seen = told.sensors[state.sensor];
+  const names = Object.keys(told.sensors), select = at("sensor"), seen = names.includes(state.sensor) && told.sensors[state.sensor];
   at("sensors").tBodies[0].replaceChildren(...names.map(name => {
     const s = told.sensors[name];
     const tr = row([name, s.state + (s.touched ? ", touched" : "") + (s.closed?.length ? ", silent" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels,
@@ -47,7 +49,7 @@ function sensors(told) {
     return tr;
   }));
   heard(seen);
-  over.zones = seen?.zones ?? {};
+  over.zones = seen.zones ?? {};
   absent(!seen || seen.state === "stale" || seen.state === "no_data");
   const minutes = Math.round((Date.now() / 1000 - counted.since) / 60);
   at("since").textContent = minutes < 60 ? `since this page was opened, ${minutes} min ago` : "in the last hour";
@@ -59,10 +61,11 @@ function sensors(told) {
   }));
   at("flag").disabled = at("note").disabled = !told.flight_recorder;
   if (!told.flight_recorder) at("done").textContent ||= "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
-  if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
-    select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
-    if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); }
-  }
+  const offered = seen || !state.sensor ? names : [state.sensor, ...names]; // a daemon that starts again has not heard it yet
+  const texts = offered.map(name => names.includes(name) ? name : `${name} (not heard so far)`);
+  if (texts.join("\n") !== [...select.options].map(o => o.text).join("\n"))
+    select.replaceChildren(...offered.map((name, n) => new Option(texts[n], name, false, name === state.sensor)));
+  if (!state.sensor && names.length) { select.value = names[0]; open(names[0]); }
 }
 
 function listens(told) {
@@ -70,9 +73,9 @@ function listens(told) {
   return told.armed === false ? "not armed" : told.armed ? "armed" : "listens";
 }
 
-function heard(told) { // what the sensor that is looked at listens to, as far as the daemon has said it
-  at("listens").textContent = told ? listens(told) : "";
-  at("gate").disabled = !told;
+function heard(told, absent = state.sensor && "not heard so far") { // what the sensor that is looked at listens to
+  at("listens").textContent = told ? listens(told) : absent;
+  at("gate").disabled = at("recalibrate").disabled = !told;
   at("gate").setAttribute("aria-checked", String(!told?.closed?.includes("view")));
 }
 
@@ -89,11 +92,13 @@ function row(cells) {
 }
 
 function frame(told) {
-  const frames = state.frames;
+  const frames = state.frames, last = frames.at(-1);
+  if (last && (told.time < last.time || String(told.grid) !== String(last.grid))) frames.length = 0; // the clock was set back, or another grid
   frames.push(told);
   while (frames.length && frames[0].time < told.time - KEPT_S) frames.shift();
   if (told.values) {
-    const most = frames.filter(f => f.centroid && f.values).map(f => Math.max(...f.values)).sort((a, b) => a - b);
+    told.peak = Math.max(...told.values); // once for each frame: half a minute of a large grid has millions of counts
+    const most = frames.filter(f => f.centroid && f.values).map(f => f.peak).sort((a, b) => a - b);
     const seen = Math.max(most[Math.floor((1 - OUTLIERS) * (most.length - 1))] ?? 0, 20 * told.noise);
     state.full = STEPS.find(step => step >= seen) ?? seen;
   }
