@@ -37,11 +37,6 @@ def row(start: str) -> str:
     return line
 
 
-@pytest.mark.parametrize("flag", sorted(flags(PARSERS["gestured"])))
-def test_each_flag_of_the_daemon_has_its_row(flag: str):
-    assert row(flag)
-
-
 def test_no_row_describes_a_flag_that_is_gone():
     rows = set(re.findall(r"^\| `(--[a-z0-9-]+)`", DOCUMENTS, re.MULTILINE))
     assert rows == flags(PARSERS["gestured"])

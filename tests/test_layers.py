@@ -1,7 +1,6 @@
 """The import rule of ARCHITECTURE.md: core <- model, record, simulator, client <- daemon | control | bridge | lab."""
 
 import ast
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -118,23 +117,14 @@ def test_no_two_modules_know_each_other() -> None:
     ("where", "line"),
     [
         ("core/x.py", "import asyncio"),
-        ("core/x.py", "from os import path"),
         ("core/x.py", "def f():\n    import uvloop"),
-        ("core/x.py", "from gestured.model import model"),
         ("core/x.py", "from ..record.arrays import read"),
         ("model/session.py", "import onnxruntime"),
-        ("model/x.py", "from gestured.daemon import log"),
-        ("daemon/x.py", "from gestured.lab import nets"),
         ("daemon/x.py", "from ..control import cli"),
         ("control/x.py", "def f():\n    import gestured.daemon.settings"),
-        ("lab/x.py", "from gestured import daemon"),
         ("simulator/x.py", "import torch"),
-        ("daemon/x.py", "import prometheus_client"),
         ("control/x.py", "def f():\n    from pythonosc.udp_client import SimpleUDPClient"),
         ("daemon/x.py", "def f():\n    import onnxruntime"),
-        ("bridge/x.py", "from gestured.control import cli"),
-        ("daemon/x.py", "from gestured.bridge import mqtt"),
-        ("control/x.py", "import zenoh"),
         ("lab/x.py", "from experiments import foreign"),
     ],
 )
@@ -147,20 +137,3 @@ def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: py
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(line)
     assert len(faults(path)) == 1
-
-
-def test_the_core_runs_where_only_numpy_is_installed() -> None:
-    modules = [f"gestured.core.{path.stem}" for path in (PACKAGE / "core").glob("*.py") if path.stem != "__init__"]
-    script = f"""
-import sys
-import numpy
-before = set(sys.modules)
-for name in {modules}:
-    __import__(name)
-print(*sorted({{name.split(".")[0] for name in set(sys.modules) - before}}))
-"""
-    shown = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    new = set(shown.stdout.split())
-    assert new >= {"gestured"}
-    assert new - {"gestured", "numpy"} <= sys.stdlib_module_names
-    assert not new & {"asyncio", "socket", "selectors", "logging", "sqlite3", "subprocess"}

@@ -23,7 +23,6 @@ from gestured.core.errors import ModelError
 from gestured.core.frames import Before
 from gestured.core.own import EXAMPLES
 from gestured.model import file as model_file
-from gestured.model import points
 from gestured.model import process as model_process
 from gestured.model.features import touch_pattern
 from gestured.model.metadata import Metadata
@@ -35,7 +34,7 @@ from gestured.model.shipped import LADDER, shipped
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
 from tests.opening import NO_FILES, no_file
-from tests.small_model import GESTURES, STRICTER, WINDOW, build, operating_points, oracle, properties, segment
+from tests.small_model import GESTURES, WINDOW, build, operating_points, oracle, properties, segment
 
 
 def refusal(path: Path | str) -> str:
@@ -235,26 +234,6 @@ def test_a_model_without_operating_points_is_as_before_and_one_with_them_reports
     assert model.points is not None and [list(row) for row in model.metadata.curve] == stored.pop("curve")
     assert json.loads(json.dumps(check(path)))["operating_points"] == stored
     assert model.classify(segment()).points is model.points
-
-
-JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(0, 2) | st.text(max_size=3),
-    lambda one: st.lists(one, max_size=3) | st.dictionaries(st.sampled_from([*POINT, *GESTURES]), one, max_size=5),
-    max_leaves=8,
-)  # fmt: skip
-
-
-@given(st.dictionaries(st.sampled_from([*STRICTER, "curve"]), JSON | st.just(POINT)), st.sampled_from([*POINT]), JSON)
-def test_whatever_stands_for_operating_points_is_taken_or_refused_in_a_sentence(
-    changes: dict[str, Any], key: str, value: Any
-) -> None:
-    stored = json.loads(operating_points()) | {"eager": POINT | {key: value}} | changes
-    try:
-        found, _ = points.operating_points(stored, GESTURES)
-    except ValueError as error:
-        assert "expected" in str(error) and "\n" not in str(error)
-        return
-    assert all(0 <= p.thresholds[g] <= 1 and 0 <= p.missed <= 1 for p in found.values() for g in GESTURES)
 
 
 def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:

@@ -8,11 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.activity import hardly_ever
-from gestured.core.contact import AfterEffect
-from gestured.core.frames import Frame
-from gestured.core.front_end import Cut, Ended, Found, Opened, Void
-from tests.scenario import Player, Scenario, ScenarioError, load, parse
+from gestured.core.front_end import Cut, Ended, Opened, Void
+from tests.scenario import Player, Scenario, load, parse
 
 SCENARIOS = sorted((Path(__file__).parent / "scenarios").glob("*.txt"))
 
@@ -23,12 +20,6 @@ def test_scenario(path: Path) -> None:
     assert any(step.verb == "expect" for step in scenario.steps)
     for seed in range(3):
         assert Player(scenario, seed).play() == []
-
-
-@pytest.mark.parametrize("line", ["tap 4,4", "press 4 0.8 for 1s", "press 4,4 0.8 for long", "sensor colour red"])
-def test_a_line_that_is_none_is_named(line: str) -> None:
-    with pytest.raises(ScenarioError, match=r"^x\.txt:2: "):
-        parse("x", f"quiet for 1s\n{line}\n")
 
 
 # --- any stream
@@ -79,47 +70,6 @@ def test_every_onset_has_one_answer_and_one_release(scenario: Scenario, seed: in
             assert onset.onset <= segment.onset <= segment.offset == release.offset <= answer.decided
             assert segment.frames.shape == (len(segment.times), scenario.sensor.rows, scenario.sensor.columns)
             assert np.isfinite(segment.frames).all() and (np.diff(segment.times) > 0).all()
-
-
-def told(event: Found, start: float) -> tuple[object, ...]:
-    """All that an event says, counted from `start`."""
-    if isinstance(event, Opened):
-        return "onset", event.onset - start
-    if isinstance(event, Ended):
-        return "release", event.offset - start
-    if isinstance(event, Void):
-        return "cancelled", event.reason
-    segment = event.segment
-    times = (segment.times - start).tolist()
-    decided = pytest.approx(event.decided - start, abs=1e-6)  # a wait is no whole number of the clock's digits
-    return "cut", decided, times, segment.first, segment.last, segment.frames.tolist()
-
-
-@settings(max_examples=30, deadline=None)
-@given(streams, seeds, st.integers(1, 2**20))
-def test_shifting_all_times_changes_nothing_else(scenario: Scenario, seed: int, start: int) -> None:
-    here = [told(event, 0.0) for event in Player(scenario, seed).play()]
-    there = [told(event, start) for event in Player(scenario, seed, start).play()]
-    assert here == there
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.lists(st.floats(-1, 1), min_size=9, max_size=9), min_size=1, max_size=20), seeds)
-def test_activity_below_the_threshold_yields_nothing(patterns: list[list[float]], seed: int) -> None:
-    player = Player(parse("idle", "sensor grid 3x3\nquiet for 2s"), seed)
-    assert player.play() == []
-    front_end = player.front_end
-    untouched = AfterEffect(hardly_ever(9))
-    idle = np.full((3, 3), player.scenario.sensor.baseline)
-    for n, pattern in enumerate(patterns):
-        values = idle + 50 * np.reshape(pattern, (3, 3))
-        while True:  # all of it just below
-            look = front_end.conditioner.look(10 + n / 15, values.reshape(-1), untouched)
-            if look.activity < hardly_ever(9) and not look.sunken:
-                break
-            values = values - 0.05 * look.above.reshape(3, 3)
-        assert front_end.push(Frame(10 + n / 15, values)) == []
-        assert not front_end.touched
 
 
 @settings(max_examples=30, deadline=None)

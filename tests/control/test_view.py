@@ -154,13 +154,6 @@ def test_what_changes_anything_needs_the_header(view: Page, real: Daemon, arm: s
         assert view.ask("/flag", "POST", sent, **mine)[0] == 400
 
 
-def test_without_a_flight_recorder_flag_says_what_keeps_packets(serve, tmp_path: Path) -> None:
-    with viewing(serve().ready["control"], tmp_path) as page:
-        status, _, body = page.come_in().ask("/flag", "POST", {"note": "a tap"}, Origin=f"http://{page.address}")
-    assert status == 409 and "--flight-recorder" in json.loads(body)["error"]
-    assert list(tmp_path.glob("flag-*")) == []
-
-
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "192.0.2.1:9109", "[::]:0"])
 def test_it_is_served_on_this_machine_alone(run, real: Daemon, listen: str) -> None:
     status, out, err = run("view", "--listen", listen, "--control", real.ready["control"])

@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.core import messages
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Onset
 from gestured.core.messages import Subscription
 from gestured.daemon import client as one_client
 from gestured.daemon import clients
@@ -145,31 +143,6 @@ async def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeyp
         assert json.loads(c.recv(99))["type"] == "error" and c.recv(99) == b""
         assert server.count == 2 and metrics.evicted.values == {("too_many",): 1}
         await server.close(0)
-
-
-async def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
-    calls = []
-    encode = messages.to_json
-    monkeypatch.setattr(
-        messages, "to_json", lambda event, *rest, **more: calls.append(event) or encode(event, *rest, **more)
-    )
-    server = serve(listener)
-    socks = [connect(listener) for _ in range(10)]
-    await turn()
-    server.publish(Onset("arm", 1, 2.0), 0.0)
-    assert calls == []  # nobody wants it
-    for sock in socks[:6]:
-        sock.send(b'{"subscribe":{"types":["onset"]}}\n')
-    socks[6].send(b'{"subscribe":{"types":["onset","gesture"]}}\n')
-    await turn()
-    server.publish(Onset("arm", 1, 2.0), 10.0)
-    assert len(calls) == 1
-    assert {sock.recv(999) for sock in socks[:7]} == {b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'}
-    for sock in socks:
-        sock.close()
-    await turn()
-    assert server.count == 0
-    await server.close(0)
 
 
 async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:

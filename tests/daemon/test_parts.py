@@ -14,10 +14,8 @@ from types import SimpleNamespace
 import pytest
 
 from gestured.core.address import Address
-from gestured.core.errors import SettingsError
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.core.where import Zone
 from gestured.core.wire import Decoder
 from gestured.daemon import http, log, udp
 from gestured.daemon.http import HttpThread, as_json
@@ -352,20 +350,3 @@ def test_http_that_cannot_start_says_so_instead_of_waiting(monkeypatch) -> None:
     monkeypatch.setattr(asyncio, "SelectorEventLoop", broken)
     with socket.create_server(("127.0.0.1", 0)) as sock, pytest.raises(AddressError, match="metrics: .*Too many open"):
         HttpThread(sock, {})
-
-
-def test_zones_are_tables_of_their_sensor_and_two_that_overlap_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "gestured.toml"
-    path.write_text('[sensors.arm.zones.volume]\nat = [0.0, 0.5, 1.0, 1.0]\ngestures = ["swipe_left"]\n')
-    settings, _ = load_settings({"config": str(path)}, {})
-    scene = Scene.from_dict(json.loads(settings.model_dump_json()), ("swipe_left",), (9, 9))  # as a tape has them
-    assert scene.setup("arm").zones == {"volume": Zone((0.0, 0.5, 1.0, 1.0), ("swipe_left",))}
-    with path.open("a") as file:
-        file.write("[sensors.arm.zones.lamp]\nat = [0.4, 0.0, 0.6, 0.6]\n")
-    with pytest.raises(
-        SettingsError, match=r"sensors\.arm.*zones\.volume at .* and zones\.lamp at .* overlap, expected"
-    ):
-        load_settings({"config": str(path)}, {})
-    path.write_text("[sensors.arm.zones.volume]\nat = [0.0, 0.5, 1.0, 1.0]\ngesture = []\n")
-    with pytest.raises(SettingsError, match=r"sensors\.arm\.zones\.volume\.gesture = .*did you mean gestures\?"):
-        load_settings({"config": str(path)}, {})
