@@ -264,6 +264,22 @@ def test_a_program_that_hangs_is_said_and_seen_again_by_itself(start, real: Daem
     browser.until(f"{said}.startsWith('gestured ')")
 
 
+def test_a_further_tab_says_what_it_waits_for(view: Page, browser: Browser) -> None:
+    """A browser makes six connections to one server: the last one is for what its tabs ask for."""
+    view.come_in()
+    tabs = [view.stream() for _ in range(5)]
+    browser.call("Page.navigate", url=f"http://{view.address}/")
+    said = "document.getElementById('state')?.textContent"
+    browser.until(f"{said}?.startsWith('This address has been used')")
+    browser.run(f"sessionStorage.setItem('secret', {view.secret!r})")  # as of a tab that is duplicated
+    browser.call("Page.reload")
+    browser.until(f"{said}?.includes('close one')")
+    tabs.pop().close()
+    browser.until(f"{said}.startsWith('gestured ')")
+    for tab in tabs:
+        tab.close()
+
+
 @pytest.mark.parametrize("then", [{"grid": [4, 4]}, {"time": 50.0}], ids=["another grid", "a clock set back"])
 def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
     view: Page, browser: Browser, then: dict[str, object]

@@ -13,7 +13,7 @@ from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError
 
 PAGE = Path(__file__).with_name("page")
-BROWSERS = 32  # streams at a time
+TABS = 5  # that look at a time: a browser makes six connections to a server, and needs one for what its tabs ask
 VERBS = {"/silence": "inhibit", "/hear": "allow", "/recalibrate": "recalibrate"}  # path -> what the daemon is asked
 
 
@@ -23,7 +23,7 @@ class ViewServer(Server):
     def __init__(self, listen: Address, source: Source, door: Door) -> None:
         super().__init__(listen, door, PAGE, _Handler)
         self.source = source
-        self.browsers = threading.Semaphore(BROWSERS)
+        self.tabs = threading.Semaphore(TABS)
 
 
 class _Handler(Handler):
@@ -36,8 +36,8 @@ class _Handler(Handler):
         sensor = query.get("sensor", "")
         if sensor and not is_sensor(sensor):
             self.refuse(HTTPStatus.BAD_REQUEST, "sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -")
-        elif not self.server.browsers.acquire(blocking=False):
-            self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages look already")
+        elif not self.server.tabs.acquire(blocking=False):
+            self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, f"{TABS} tabs look already: close one")
         else:
             looker = Looker(sensor, query.get("raw") == "1")
             try:
@@ -45,7 +45,7 @@ class _Handler(Handler):
                 self.stream(looker)
             finally:
                 self.server.source.leave(looker)
-                self.server.browsers.release()
+                self.server.tabs.release()
 
     def act(self, what: dict[str, Any]) -> Said:
         """Flag, recalibrate, silence or let be heard."""

@@ -34,8 +34,10 @@ async function heardOf(reader) { // what comes next; the end where nothing does,
 
 async function listen(path, signal, hear, lost) { // server-sent events; EventSource sends no header
   while (!signal.aborted) {
+    let busy = "";
     try {
       const answer = await ask(path, { signal });
+      if (answer.status === 503) throw new Error(busy = await answer.text()); // there is no place now
       if (!answer.ok) { lost(await answer.text()); return; }
       const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
       for (let rest = "", part; !(part = await heardOf(reader)).done;) {
@@ -48,7 +50,7 @@ async function listen(path, signal, hear, lost) { // server-sent events; EventSo
       }
     } catch { /* it has gone, or something else is looked at */ }
     if (signal.aborted) return;
-    lost("the program that serves this page does not answer: does it still run?");
+    lost(busy || "the program that serves this page does not answer: does it still run?");
     await new Promise(again => setTimeout(again, 1000));
   }
 }
