@@ -37,7 +37,8 @@ class FlexiTac(Protocol):
             if self._buffer.startswith(self.MARKER) and self._buffer.startswith(self.MARKER, size):
                 found.append(self._take(size))
             else:
-                self._pass(self._next_marker())
+                at = self._buffer.find(self.MARKER, 1)  # behind the first byte; else half of one may stand at the end
+                self._pass(at if at > 0 else len(self._buffer) - self._buffer.endswith(self.MARKER[:1]))
         return found
 
     def flush(self) -> list[Reading]:
@@ -51,13 +52,6 @@ class FlexiTac(Protocol):
         values = np.frombuffer(bytes(self._buffer[len(self.MARKER) : size]), np.uint8).reshape(self.shape)
         del self._buffer[:size]
         return Reading(values)
-
-    def _next_marker(self) -> int:
-        """Where the next one is, behind the first byte; else where half of one may stand."""
-        at = self._buffer.find(self.MARKER, 1)
-        if at < 0:
-            at = len(self._buffer) - self._buffer.endswith(self.MARKER[:1])
-        return at
 
     @staticmethod
     def fits(data: bytes) -> str | None:

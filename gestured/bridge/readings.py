@@ -39,11 +39,6 @@ class Unwrapped:
         return counter + self._beyond
 
 
-def signed(counter: int) -> int:
-    """A frame counter as an `i` of OSC: an int32, which overflows."""
-    return (counter + 2**31) % 2**32 - 2**31
-
-
 class Protocol(ABC):
     """The bytes of one connection. `passed` counts those that belong to no frame."""
 

@@ -64,62 +64,60 @@ class Retained:
             wanted[topic_of(self._host, sensor, "state")] = state
             wanted[topic_of(self._host, sensor, "gates")] = json.dumps(daemon.listening.get(sensor, OPEN))
             if self._discovers and daemon.gestures:
-                found = discovery(self._prefix, self._host, daemon.version, sensor, daemon.gestures, self._gate)
+                found = self._discovery(sensor, daemon.gestures)
                 wanted |= {topic: json.dumps(payload) for topic, payload in found}
         return wanted
 
-
-def discovery(  # noqa: PLR0913 - each is a part of a topic or a payload
-    prefix: str, host: str, version: str, sensor: str, gestures: Sequence[str], gate: str | None
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """(topic, payload) of all that a sensor has; `prefix` is Home Assistant's discovery prefix."""
-    base = f"gestured/{host}"
-    node = f"gestured_{host}"
-    common = {
-        "device": {
-            "identifiers": [f"{node}_{sensor}"],
-            "name": f"{sensor} on {host}",
-            "manufacturer": "gestured",
-            "model": "tactile sensor",
-            "sw_version": version,
-        },
-        "origin": {"name": "gestured", "sw_version": version},
-        "qos": 1,
-    }
-    event = {
-        "name": "Gesture",
-        "unique_id": f"{node}_{sensor}_gesture",
-        "state_topic": f"{base}/{sensor}/gesture",
-        "event_types": list(gestures),
-        "value_template": EVENT,
-        "availability_topic": f"{base}/availability",
-    }
-    yield f"{prefix}/event/{node}/{sensor}/config", event | common
-    gates = {"state_topic": f"{base}/{sensor}/gates", "availability_topic": f"{base}/availability"}
-    listens = {
-        "name": "Listens",
-        "unique_id": f"{node}_{sensor}_listens",
-        "value_template": LISTENS,
-        "json_attributes_topic": f"{base}/{sensor}/gates",
-    }
-    yield f"{prefix}/binary_sensor/{node}/{sensor}/config", listens | gates | common
-    if gate is not None:
-        switch = {
-            "name": f"Gate {gate}",
-            "unique_id": f"{node}_{sensor}_gate_{gate}",
-            "command_topic": f"{base}/{sensor}/gate/set",
-            "payload_on": ON,
-            "payload_off": OFF,
-            "value_template": f"{{{{ 'OFF' if '{gate}' in value_json.closed else 'ON' }}}}",
+    def _discovery(self, sensor: str, gestures: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+        """(topic, payload) of all that Home Assistant learns of a sensor."""
+        prefix, host, gate, version = self._prefix, self._host, self._gate, self._daemon.version
+        base = f"gestured/{host}"
+        node = f"gestured_{host}"
+        common = {
+            "device": {
+                "identifiers": [f"{node}_{sensor}"],
+                "name": f"{sensor} on {host}",
+                "manufacturer": "gestured",
+                "model": "tactile sensor",
+                "sw_version": version,
+            },
+            "origin": {"name": "gestured", "sw_version": version},
+            "qos": 1,
         }
-        yield f"{prefix}/switch/{node}/{sensor}/config", switch | gates | common
-    for gesture in gestures:
-        trigger = {
-            "automation_type": "trigger",
-            "topic": f"{base}/{sensor}/gesture",
-            "type": "gesture",
-            "subtype": gesture,
-            "payload": gesture,
-            "value_template": "{{ value_json.gesture }}",
+        event = {
+            "name": "Gesture",
+            "unique_id": f"{node}_{sensor}_gesture",
+            "state_topic": f"{base}/{sensor}/gesture",
+            "event_types": list(gestures),
+            "value_template": EVENT,
+            "availability_topic": f"{base}/availability",
         }
-        yield f"{prefix}/device_automation/{node}/{sensor}-{plain(gesture)}/config", trigger | common
+        yield f"{prefix}/event/{node}/{sensor}/config", event | common
+        gates = {"state_topic": f"{base}/{sensor}/gates", "availability_topic": f"{base}/availability"}
+        listens = {
+            "name": "Listens",
+            "unique_id": f"{node}_{sensor}_listens",
+            "value_template": LISTENS,
+            "json_attributes_topic": f"{base}/{sensor}/gates",
+        }
+        yield f"{prefix}/binary_sensor/{node}/{sensor}/config", listens | gates | common
+        if gate is not None:
+            switch = {
+                "name": f"Gate {gate}",
+                "unique_id": f"{node}_{sensor}_gate_{gate}",
+                "command_topic": f"{base}/{sensor}/gate/set",
+                "payload_on": ON,
+                "payload_off": OFF,
+                "value_template": f"{{{{ 'OFF' if '{gate}' in value_json.closed else 'ON' }}}}",
+            }
+            yield f"{prefix}/switch/{node}/{sensor}/config", switch | gates | common
+        for gesture in gestures:
+            trigger = {
+                "automation_type": "trigger",
+                "topic": f"{base}/{sensor}/gesture",
+                "type": "gesture",
+                "subtype": gesture,
+                "payload": gesture,
+                "value_template": "{{ value_json.gesture }}",
+            }
+            yield f"{prefix}/device_automation/{node}/{sensor}-{plain(gesture)}/config", trigger | common

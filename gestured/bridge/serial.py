@@ -15,7 +15,7 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.bridge.options import BridgeError, add_destination, add_metrics, need
 from gestured.bridge.protocols import PROTOCOLS, looks_like
-from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped, signed
+from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped
 from gestured.client.program import Commands, on_stop
 from gestured.client.sensor import Form, connected, sent_after_refusal
 from gestured.client.values import rows_by_columns, sensor_name
@@ -162,7 +162,7 @@ class Serial:
                 self._counts.add("frames", "overtaken")
                 continue
             moment = time.time() if reading.moment is None else reading.moment
-            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), signed(counter), moment)
+            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, moment)
             try:
                 heard = not sent_after_refusal(self._socket, packet)
             except OSError:  # the network is down: as good as nobody who listens

@@ -41,7 +41,7 @@ class Form:
     def _pressure(self, values: NDArray[np.generic], counter: int | None) -> bytes:
         address = f"/{self.sensor}/pressure"
         flat = np.ravel(values)
-        types, args = ("", []) if counter is None else ("i", [counter])
+        types, args = ("", []) if counter is None else ("i", [(counter + 2**31) % 2**32 - 2**31])  # it overflows
         if self.values in ("floats", "ints"):
             tag, numbers = ("f", flat.astype(">f4")) if self.values == "floats" else ("i", np.rint(flat).astype(">i4"))
             head = osc_out.head(address, types + tag * flat.size)

@@ -76,8 +76,7 @@ class Labelled:
             for frame in found.stream(g):
                 counter += 1
                 t = float(start + (frame.t - first))
-                wrapped = (counter + 2**31) % 2**32 - 2**31  # an int32
-                yield Packet(round(1e9 * t), SOURCE, form.packet(frame, wrapped, t))
+                yield Packet(round(1e9 * t), SOURCE, form.packet(frame, counter, t))
 
     def _performed(self) -> Iterator[Performed]:
         found = self._found

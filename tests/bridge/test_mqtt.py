@@ -17,7 +17,7 @@ import pytest
 
 from gestured.bridge import daemon as known
 from gestured.bridge.counts import Counts
-from gestured.bridge.retained import Retained, discovery
+from gestured.bridge.retained import Retained
 from tests.bridge.conftest import Broker, Process, emit, guarded, page, wait
 from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import HELLO, FakeDaemon
@@ -282,7 +282,10 @@ def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake)
 def test_templates_make_of_an_event_what_home_assistant_expects():
     """With its template engine, and its filter `tojson`."""
     jinja2 = pytest.importorskip("jinja2", reason="the extra [lab] brings the template engine")
-    found = dict(discovery("homeassistant", "car", "1", "armrest", ["one_tap"], "house"))
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    daemon.take(HELLO | {"gestures": ["one_tap"], "sensors": {"armrest": 0}})
+    retained = Retained(daemon, "car", "homeassistant", "house", discovers=True)
+    found = {topic: json.loads(payload) for topic, payload in retained.changes() if topic.startswith("homeassistant/")}
     value = gesture(7) | {"instance": "i"}
     event = found["homeassistant/event/gestured_car/armrest/config"]
     made = json.loads(jinja2.Environment().from_string(event["value_template"]).render(value_json=value))

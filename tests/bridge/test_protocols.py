@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from gestured.bridge.protocols import PROTOCOLS, looks_like
-from gestured.bridge.readings import Protocol, Unwrapped, signed
+from gestured.bridge.readings import Protocol, Unwrapped
+from gestured.client.sensor import Form
+from gestured.core.frames import Frame
+from gestured.core.osc import decode
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival
 
@@ -200,10 +203,11 @@ def test_noise_looks_like_nothing():
 @given(lost=st.sets(st.integers(0, 80)), first=st.integers(-40, 0))
 def test_a_counter_that_overflows_is_no_sensor_that_began_anew(bits: int, lost: set[int], first: int):
     """At most some of the frames around the overflow are lost; the daemon's own stamper says how many."""
-    own, stamper, before = Unwrapped(), Stamper(), None
+    own, stamper, before, form = Unwrapped(), Stamper(), None, Form("pad")
     kept = [n for n in range(81) if n not in lost or n % 8 == 0]
     for n in kept:
-        counter = signed(own.of((first + n) % 2**bits))
+        packet = form.packet(Frame(0.0, np.zeros((2, 2))), own.of((first + n) % 2**bits), 0.0)
+        counter = decode(packet)[0].args[0]
         (stamp,) = stamper.stamp([Arrival("pad", np.zeros((2, 2)), counter, None, ())], n / 15)
         assert not stamp.restarted and not stamp.dropped and stamp.lost == (0 if before is None else n - before - 1)
         before = n
