@@ -285,7 +285,7 @@ def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
     view: Page, browser: Browser, then: dict[str, object]
 ) -> None:
     browser.call("Page.navigate", url=view.whole)
-    browser.until("typeof state === 'object' && state.stream !== null")
+    browser.until("typeof frame === 'function' && state.stream !== null")
     first = {"time": 100.0, "grid": [9, 9], "centroid": None, "values": None, "phase": "IDLE", "noise": 1.0}
     first |= {"activity": 1.0, "on": 6.0, "off": 3.0, "bad": []}
     frames = [first, first | {"time": 101.0}, first | {"time": 102.0} | then]
