@@ -27,7 +27,6 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
     [
         ("frames", np.zeros((10, 6), np.uint8), "expected the shape (N, R, C)"),
         ("frames", np.zeros((9, 2, 3), np.uint8), "expected the shape (9,), found (10,)"),
-        ("frames", np.zeros((10, 0, 3), np.uint8), "(N, R, C)"),
         (
             "frames",
             np.zeros((10, 1, 9), np.uint8),
@@ -36,7 +35,6 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
         ("frames", np.zeros((10, 2, 65), np.uint8), "R and C from 2 to 64"),
         ("frames", np.full((10, 2, 3), 1e39), "recording 0: expected values that a float32 holds"),
         ("frames", np.zeros((10, 2, 3), complex), "complex128"),
-        ("frames", np.zeros((10, 2, 3), bool), "bool"),
         ("frames", np.full((10, 2, 3), np.nan), "recording 0: expected finite"),
         (
             "frames",
@@ -44,14 +42,12 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
             "recording 1: expected",
         ),
         ("times", np.zeros(9), "(10,)"),
-        ("times", np.arange(10, dtype=np.float32), "float64"),
         ("times", np.arange(10), "expected float64, found int64"),
         ("times", changed("times", 5, 0.0), "recording 1: expected strictly increasing"),
         ("times", changed("times", 2, np.nan), "recording 0: expected finite"),
         ("times", changed("times", 9, np.inf), "recording 1: expected finite"),
         ("times", 1e12 + np.arange(10), "recording 0: expected seconds, at most 1e+11"),
         ("offsets", np.array([0, 4, 10], np.int32), "expected int64, found int32"),
-        ("offsets", np.array([0.0, 4.0, 10.0]), "expected int64, found float64"),
         ("offsets", np.array([1, 4, 10]), "from 0 to 10"),
         ("offsets", np.array([0, 4, 11]), "from 0 to 10"),
         ("offsets", np.array([0, 11, 10]), "recording 1: expected at least one frame"),
@@ -60,7 +56,6 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
         ("labels", np.array(["one_tap"]), "(2,)"),
         ("labels", np.array([1, 2]), "text"),
         ("labels", changed("labels", 1, "One Tap"), "recording 1: expected 1 to 64"),
-        ("labels", changed("labels", 0, ""), "recording 0"),
         ("labels", changed("labels", 0, "a" * 65), "recording 0"),
         ("labels", np.array(["\x7fffffff" * 3, "x"]), "recording 0"),
         ("subjects", np.array([[3], [4]]), "(2,)"),
@@ -82,9 +77,7 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
         ("event_recording", np.array([0, 2, 1]), "event 1: expected 0 to 1"),
         ("event_labels", changed("event_labels", 2, "Swipe!"), "event 2: expected 1 to 64"),
         ("event_onsets", changed("event_onsets", 0, -0.1), "event 0: expected a time within"),
-        ("event_onsets", changed("event_onsets", 1, np.nan), "event 1: expected a time within"),
         ("event_offsets", changed("event_offsets", 2, 0.2), "event 2: expected a time from"),
-        ("event_offsets", changed("event_offsets", 1, 0.4), "event 1: expected a time from"),
     ],
 )
 def test_wrong_field_is_named(tmp_path: Path, name: str, value: np.ndarray | None, expected: str) -> None:

@@ -304,20 +304,6 @@ def test_templates_make_of_an_event_what_home_assistant_expects():
         assert tuple(jinja2.Environment().from_string(each).render(value_json=told) for each in templates) == expected
 
 
-def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):
-    at = broker()
-    listener = listen(at.port, "homeassistant/#")
-    started(bridge, at, fake)
-    trigger = "homeassistant/device_automation/gestured_car/armrest-{}/config"
-    event = "homeassistant/event/gestured_car/armrest/config"
-    fake.say({"type": "gestures", "gestures": ["one_tap", "wave"]})
-    assert json.loads(listener.until(trigger.format("wave")).payload)["subtype"] == "wave"
-    fake.say({"type": "gestures", "gestures": ["one_tap"]})
-    listener.until(trigger.format("wave"), "")
-    wait(lambda: json.loads(retained(listen, at, event)[event])["event_types"] == ["one_tap"])
-    assert trigger.format("wave") not in retained(listen, at)
-
-
 def test_what_was_forgotten_while_the_broker_was_away_is_cleared_when_it_is_back():
     daemon = known.Daemon(None, None, Counts("mqtt"))
     retained = Retained(daemon, "car", "homeassistant", discovers=True)

@@ -68,7 +68,6 @@ def test_an_ipv6_address_is_said_as_it_is_given(start):
     ("flags", "dtype"),
     [
         (("--blob",), ">u2"),
-        (("--blob", "uint8"), ">u1"),
         (("--blob", "float32"), ">f4"),
         ((), None),
     ],

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gestured.control.cli import main
 from gestured.control.tune import play
-from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, for_each, proposed, tune
+from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, tune
 from gestured.core.errors import GesturedError
 from gestured.core.points import STRICTNESS
 from gestured.core.sensor import ABSENT_S
@@ -59,20 +59,6 @@ def test_each_threshold_is_counted() -> None:
     assert counted(played, 0.05, "swipe_left") == Counts(0.05, right=1, wrong=1, missed=1, false=1, unmeant=0)
     each = {"one_tap": 0.75, "swipe_left": 0.55, "swipe_right": 0.05}
     assert counted(played, each) == Counts(None, right=3, wrong=0, missed=2, false=0, unmeant=0)
-
-
-@given(st.lists(st.tuples(st.sampled_from(NAMES), st.floats(0, 1)), max_size=12))
-def test_what_is_proposed_costs_least(said: list[tuple[str, float]]) -> None:
-    played = Played(seconds=60.0)
-    performed = [Performed(NAMES[k % 3], "", 2.0 * k, 2.0 * k + 0.3) for k in range(8)]
-    played.add(performed, [event(name, 2.0 * k, confidence) for k, (name, confidence) in enumerate(said)])
-    rows = [counted(played, threshold) for threshold in THRESHOLDS]
-    for threshold, row in zip(THRESHOLDS, rows, strict=True):
-        assert row.right + row.wrong + (row.missed or 0) == 8
-        assert row.right + row.wrong + row.false == sum(confidence >= threshold for _, confidence in said)
-    best = proposed(rows, 0.5)
-    assert best is not None and all(best.cost <= row.cost for row in rows)
-    assert not for_each(played, 0.5)  # of each there are too few
 
 
 # Upper 95 % limits of a Poisson mean by count, as any table of them has it.

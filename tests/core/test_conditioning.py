@@ -575,31 +575,20 @@ def test_the_least_of_all_changes_is_no_unit(least: float) -> None:
     assert 0.0 < front_end.noise < 1.0
 
 
-@pytest.mark.parametrize("size", [1e6, 1e12, 1e30, -1e12])
+@pytest.mark.parametrize("size", [1e4, 1e6, 1e12, 1e30, -1e12])
 @pytest.mark.parametrize("taxels", [1, 81])
 @pytest.mark.parametrize("moment", [0.4, 1.4, 2.4])  # while it settles, in idle, in a gesture
 def test_one_spike_is_forgotten(size: float, taxels: int, moment: float) -> None:
-    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), quiet(10), *GESTURES])
-    frames[np.searchsorted(times, moment)].reshape(-1)[:taxels] += size
+    """One odd number must not make a sensor deaf: where it is one taxel's, touches count within three seconds."""
+    where, pause = (slice(31, 32), 3.0 if moment > 1.0 else 10.0) if taxels == 1 else (slice(81), 10.0)
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), quiet(pause), *GESTURES])
+    frames[np.searchsorted(times, moment)].reshape(-1)[where] += size
     with np.errstate(all="raise"):
         front_end, events = heard(times, frames)
     follow_rules(events)
-    late = [event for event in events if isinstance(event, Cut) and event.segment.onset > 12.0]
-    assert len(late) == 3
-    assert front_end.noise == pytest.approx(2.0, rel=0.3)
-
-
-@pytest.mark.parametrize("size", [1e4, 1e12, 1e30])
-@pytest.mark.parametrize("in_gesture", [False, True])
-def test_after_a_spike_touches_count_within_three_seconds(size: float, in_gesture: bool) -> None:
-    """One odd number must not make a sensor deaf."""
-    pause = [quiet(3.0), *GESTURES]
-    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), *pause] if in_gesture else [quiet(2.5), *pause])
-    frames[np.searchsorted(times, 2.4), 3, 4] += size
-    _, events = heard(times, frames)
-    follow_rules(events)
     late = [event for event in events if isinstance(event, Cut) and event.segment.onset > times[-1] - 8.0]
     assert len(late) == 3
+    assert front_end.noise == pytest.approx(2.0, rel=0.3)
 
 
 @pytest.mark.parametrize("left", [0.05, -0.05])
