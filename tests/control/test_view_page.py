@@ -213,7 +213,8 @@ def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
         daemon.stop()
         browser.until("document.body.classList.contains('absent')")
         assert not browser.run(usable) and browser.run("document.getElementById('listens').textContent") == ""
-        daemon = Daemon.start(tmp_path, model, *flags)
+        assert "--flight-recorder" in browser.run("document.getElementById('done').textContent")
+        daemon = Daemon.start(tmp_path, model, *flags, "--flight-recorder", 1)
         try:
             Sensor(daemon, "another").begin()
             browser.until("document.getElementById('sensor').options.length === 2")
@@ -231,6 +232,8 @@ def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
             browser.until(f"({usable}) && document.getElementById('listens').textContent === 'listens'")
             browser.until(f"state.frames[state.frames.length - 1].t !== {before}")
             assert browser.run("document.getElementById('sensor').selectedOptions[0].text") == "constructor"
+            assert browser.run("document.getElementById('done').textContent") == ""
+            assert not browser.run("document.getElementById('flag').disabled")
         finally:
             daemon.stop()
     assert not [said for said in browser.complaints() if "Exception" in said]

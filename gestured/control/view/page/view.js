@@ -2,6 +2,7 @@
 // The page of `gesturectl view`.
 const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100, HOUR_S = 3600, OUTLIERS = .1; // of the frames, which do not stretch the scale
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
+const NO_RECORDER = "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
 const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false, sliders: [] };
@@ -60,7 +61,8 @@ function sensors(told) {
     return li;
   }));
   at("flag").disabled = at("note").disabled = !told.flight_recorder;
-  if (!told.flight_recorder) at("done").textContent ||= "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
+  if (!told.flight_recorder) at("done").textContent ||= NO_RECORDER;
+  else if (at("done").textContent === NO_RECORDER) at("done").textContent = "";
   const offered = seen || !state.sensor ? names : [state.sensor, ...names]; // a daemon that starts again has not heard it yet
   const texts = offered.map(name => names.includes(name) ? name : `${name} (not heard so far)`);
   if (texts.join("\n") !== [...select.options].map(o => o.text).join("\n"))
