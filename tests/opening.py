@@ -45,8 +45,8 @@ def mcap(path: Path) -> object:
     recorded = Recorded(path)
     replay = Replay(recorded.tape, recorded.maker.scene, Mute(recorded.maker.scene.gestures))
     list(replay.events())
-    verdict = recorded.compare([], lambda sensor, t: True)
-    words = [difference.words() for difference in verdict.differences]
+    _, _, differences = recorded.compare([], lambda sensor, t: True)
+    words = [difference.words() for difference in differences]
     if replay.played:
         check(export.sessions_of(path)[1])
     return words

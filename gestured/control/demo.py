@@ -24,8 +24,7 @@ from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number
 from gestured.control.play import add_arguments, frames, takes
-from gestured.control.screen import Felt, Screen, in_colour
-from gestured.control.show import as_dict, block, in_words
+from gestured.control.show import Felt, Screen, as_dict, block, in_colour, in_words
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.record.judge import Outcome, Performed, Tally

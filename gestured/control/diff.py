@@ -1,7 +1,6 @@
 """What a recording's events and those of its replay have in common, and where they differ."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,13 +16,12 @@ Line = Mapping[str, Any]  # of the event stream; its times are the recording's
 Knew = Callable[[str, float], bool]  # whether a sensor's idle state was known at a time (s)
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """What became of one contact."""
 
     sensor: str
     onset: float  # s since the epoch, or on a stopwatch
-    name: str  # a gesture, "unknown", or "cancelled: " and the reason
+    answer: str  # a gesture, "unknown", or "cancelled: " and the reason
     confidence: float | None
 
     def words(self) -> str:
@@ -32,11 +30,10 @@ class Answer:
         if self.onset >= STOPWATCH_S:
             clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]
         sure = "" if self.confidence is None else f" {self.confidence:.3f}"
-        return f"{clock} {self.sensor}: {self.name}{sure}"
+        return f"{clock} {self.sensor}: {self.answer}{sure}"
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(NamedTuple):
     """One contact that was answered differently; None where one side has no such contact."""
 
     recorded: Answer | None
@@ -45,21 +42,17 @@ class Difference:
     @property
     def names(self) -> tuple[str, str]:
         """What was recorded and what the replay says, without how sure; "nothing" for a side without the contact."""
-        recorded, replayed = ("nothing" if answer is None else answer.name for answer in (self.recorded, self.replayed))
+        recorded, replayed = ("nothing" if one is None else one.answer for one in self)
         return recorded, replayed
 
     def words(self) -> str:
         """For a person: `-` is what was recorded, `+` what the replay says."""
-        sides = (("-", self.recorded), ("+", self.replayed))
-        return "\n".join(shown(f"{sign} {answer.words()}") for sign, answer in sides if answer is not None)
+        return "\n".join(
+            shown(f"{sign} {one.words()}") for sign, one in zip("-+", self, strict=True) if one is not None
+        )
 
 
-class Verdict(NamedTuple):
-    """What a comparison found."""
-
-    compared: str  # how many of what
-    skipped: int  # of them, since the sensor was not known again
-    differences: list[Difference]
+Verdict = tuple[str, int, list[Difference]]  # how many of what; not compared, since the sensor was unknown; found
 
 
 class Recorded:
@@ -75,7 +68,7 @@ class Recorded:
         usable = [answer for answer in before if knew(answer.sensor, answer.onset)]
         # A daemon that knew the sensor from before answers earlier: that was not asked.
         after = [answer for answer in answers(lines) if knew(answer.sensor, answer.onset)]
-        return Verdict(f"{len(usable)} recorded answers", len(before) - len(usable), differences(usable, after))
+        return f"{len(usable)} recorded answers", len(before) - len(usable), differences(usable, after)
 
 
 def answers(lines: Iterable[Line]) -> list[Answer]:
@@ -109,8 +102,6 @@ def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Diffe
 
 
 def _alike(old: Answer, new: Answer) -> bool:
-    if old.name != new.name:
-        return False
-    return (
-        old.confidence is None or new.confidence is None or abs(old.confidence - new.confidence) <= CONFIDENCE_TOLERANCE
-    )
+    before, after = old.confidence, new.confidence
+    sure = before is None or after is None or abs(before - after) <= CONFIDENCE_TOLERANCE
+    return sure and old.answer == new.answer

@@ -3,7 +3,6 @@
 import argparse
 from typing import Any
 
-from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
@@ -42,22 +41,16 @@ def run(args: argparse.Namespace) -> int:
             control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
             if not args.json:
                 say(f"perform {args.name} on {args.sensor} {args.examples} times, a second apart; Ctrl-C gives up")
-            return _follow(control, args)
+            for line in control.lines():
+                if args.json:
+                    say_json(line)
+                else:
+                    say(_words(line, args))
+                if "enrolled" in line or "given_up" in line:
+                    return int("given_up" in line)
+            raise Unreachable(f"the daemon on {control.path} closed the connection; nothing has changed")
     except KeyboardInterrupt:
         return 1
-
-
-def _follow(control: Control, args: argparse.Namespace) -> int:
-    for line in control.lines():
-        if args.json:
-            say_json(line)
-        else:
-            say(_words(line, args))
-        if "enrolled" in line:
-            return 0
-        if "given_up" in line:
-            return 1
-    raise Unreachable(f"the daemon on {control.path} closed the connection; nothing has changed")
 
 
 def _words(line: dict[str, Any], args: argparse.Namespace) -> str:

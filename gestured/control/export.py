@@ -2,7 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,9 +37,9 @@ def run(args: argparse.Namespace) -> int:
     """Decode, stamp and write."""
     names, made = sessions_of(args.file, args.sensor)
     recording.write(args.out, made)
-    summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}
-    words = f"{args.out}: {len(made.frames)} frames of {', '.join(names)}, {_count(made.event_labels)} gestures"
-    tell(args.json, summary | {"events": _count(made.event_labels)}, words)
+    frames, events = len(made.frames), 0 if made.event_labels is None else len(made.event_labels)
+    summary = {"file": str(args.out), "sessions": names, "frames": frames, "events": events}
+    tell(args.json, summary, f"{args.out}: {frames} frames of {', '.join(names)}, {events} gestures")
     return 0
 
 
@@ -55,10 +54,6 @@ def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recor
         said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())
         raise RecordingError(f"{path}: sensors of several grids ({said}), choose one with --sensor")
     return list(sessions), _recordings(sessions, found)
-
-
-def _count(labels: Any) -> int:
-    return 0 if labels is None else len(labels)
 
 
 def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:

@@ -31,13 +31,12 @@ class Labelled:
         self._path, self._sensor = path, sensor
         self._found = found = recording.read(path)
         spans = [found.times_of(g) for g in range(len(found))]
-        lengths = [float(times[-1] - times[0]) + BETWEEN_RECORDINGS_S for times in spans]
-        self.seconds = (
-            sum(lengths) - len(lengths) * BETWEEN_RECORDINGS_S
-        )  # of all recordings, without what lies between
+        lengths = [float(times[-1] - times[0]) for times in spans]
+        self.seconds = sum(lengths)
         self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
         begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
-        self._start = begin + np.cumsum([0.0, *lengths])[:-1]  # (G,) s, as it is played
+        # (G,) s, as it is played
+        self._start = begin + np.cumsum([0.0, *(length + BETWEEN_RECORDINGS_S for length in lengths)])[:-1]
         self.tape = Tape({}, tuple(self._packets()), (), whole=True)
 
     def scene(self, gestures: Iterable[str]) -> Scene:
@@ -47,7 +46,7 @@ class Labelled:
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Hold the events of a replay against the labels."""
-        performed = self.performed()
+        performed = list(self.performed())
         asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
         tally = Tally(waiting=performed)
         outcomes = [tally.hear(line, line["decided"]) for line in lines if line["type"] in ("gesture", "unknown")]
@@ -59,13 +58,9 @@ class Labelled:
             and outcome.verdict in DIFFERENT
             and (outcome.performed is None or id(outcome.performed) in asked)
         ]
-        found.sort(key=_moment)
+        found.sort(key=lambda one: one.performed.onset if one.performed else float((one.event or {})["onset"]))
         skipped = len(performed) - len(asked)
-        return Verdict(f"{len(asked)} labels", skipped, [self._difference(outcome) for outcome in found])
-
-    def performed(self) -> list[Performed]:
-        """What the labels say, in the times of playing."""
-        return list(self._performed())
+        return f"{len(asked)} labels", skipped, [self._difference(outcome) for outcome in found]
 
     def _packets(self) -> Iterator[Packet]:
         found = self._found
@@ -78,7 +73,8 @@ class Labelled:
                 t = float(start + (frame.t - first))
                 yield Packet(round(1e9 * t), SOURCE, form.packet(frame, counter, t))
 
-    def _performed(self) -> Iterator[Performed]:
+    def performed(self) -> Iterator[Performed]:
+        """What the labels say, in the times of playing."""
         found = self._found
         for g, label in enumerate(found.labels.tolist()):
             if label != SESSION and found.onsets is not None:
@@ -118,7 +114,3 @@ class Labelled:
     def _answer(self, t: float, name: str, confidence: float | None) -> Answer:
         g = max(int(np.searchsorted(self._start, t, "right")) - 1, 0)
         return Answer(f"recording {g}", float(t - self._start[g] + self._first[g]), name, confidence)
-
-
-def _moment(outcome: Outcome) -> float:
-    return outcome.performed.onset if outcome.performed else float((outcome.event or {})["onset"])

@@ -44,32 +44,26 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print until the count is reached, the daemon ends, or Ctrl-C; exit status 2 for what no daemon sends."""
-    try:
-        return _listen(args)
-    except Unsubscribed as error:
-        say(f"gesturectl: {error}", to=sys.stderr)
-        return 2
-
-
-def _listen(args: argparse.Namespace) -> int:
-    path = event_path(args)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture, "zones": args.zone}
-    left = args.count
-    early: dict[str, dict[str, Any]] = {}  # for `readable`
-
-    with Subscriber(path, **wanted, reconnect=args.reconnect, say=partial(say, to=sys.stderr)) as subscriber:
-        for line, event in subscriber.lines():
-            kind = event.get("type")
-            if args.json:
-                _repeat(line, event)
-            elif kind != "hello":
-                say(readable(event, early))
-            if kind == "hello":
-                _greet(event, args)
-            elif left is not None and kind != "lost":
-                left -= 1
-                if left <= 0:
-                    return 0
+    left, early = args.count, dict[str, dict[str, Any]]()  # the latter for `readable`
+    told = partial(say, to=sys.stderr)
+    try:
+        with Subscriber(event_path(args), **wanted, reconnect=args.reconnect, say=told) as subscriber:
+            for line, event in subscriber.lines():
+                kind = event.get("type")
+                if args.json:
+                    _repeat(line, event)
+                elif kind != "hello":
+                    say(readable(event, early))
+                if kind == "hello":
+                    _greet(event, args)
+                elif left is not None and kind != "lost":
+                    left -= 1
+                    if left <= 0:
+                        return 0
+    except Unsubscribed as error:
+        told(f"gesturectl: {error}")
+        return 2
     return 0
 
 

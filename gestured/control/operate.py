@@ -109,14 +109,6 @@ def _reloaded(answer: dict[str, Any]) -> Iterable[str]:
     yield f"reloaded; {answer['model']} answers{rest}"
 
 
-def _recalibrated(answer: dict[str, Any]) -> Iterable[str]:
-    yield f"learning {', '.join(answer['sensors'])} anew; do not touch for a second"
-
-
-def _emitted(answer: dict[str, Any]) -> Iterable[str]:
-    yield f"published {answer['gesture']} of {answer['sensor']} as #{answer['sequence']}, marked as a test"
-
-
 def _gates(answer: dict[str, Any]) -> Iterable[str]:
     """Which sensors are silent now, and by which gates."""
     silent = [f"{name} ({', '.join(gates)})" for name, gates in answer["sensors"].items() if gates]
@@ -138,8 +130,8 @@ def _known(answer: dict[str, Any]) -> Iterable[str]:
 # Verb -> what the daemon's answer says, in lines for a person.
 WORDS: dict[str, Callable[[dict[str, Any]], Iterable[str]]] = {
     "reload": _reloaded,
-    "recalibrate": _recalibrated,
-    "emit": _emitted,
+    "recalibrate": lambda answer: [f"learning {', '.join(answer['sensors'])} anew; do not touch for a second"],
+    "emit": lambda answer: ["published {gesture} of {sensor} as #{sequence}, marked as a test".format(**answer)],
     "inhibit": _gates,
     "allow": _gates,
     "gestures": _known,

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -70,7 +70,9 @@ def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
 
 def _shape(seen: Seen, taxels: int) -> Grid | None:
     """Rows and columns for so many taxels: those with which a touch looks like a finger's, else the squarest."""
-    shapes = list(_shapes(taxels))
+    sides = range(SIDES[0], SIDES[1] + 1)
+    shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
+    shapes.sort(key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
     if not shapes:
         return None
     frames = np.array([frame.reshape(-1) for _, frame in seen.matrices(*shapes[0])])
@@ -83,13 +85,6 @@ def _shape(seen: Seen, taxels: int) -> Grid | None:
         if alike[best] > ALIKE:
             return best
     return shapes[0]
-
-
-def _shapes(taxels: int) -> Iterator[Grid]:
-    """Grids of so many taxels, the squarest first."""
-    sides = range(SIDES[0], SIDES[1] + 1)
-    shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
-    yield from sorted(shapes, key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
 
 
 def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:

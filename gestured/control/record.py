@@ -13,7 +13,7 @@ from typing import Any
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable, read_ahead
 from gestured.client.program import Commands, on_stop
-from gestured.client.say import say, say_json
+from gestured.client.say import say, tell
 from gestured.client.values import number
 from gestured.control.address import add_sockets, connect, finish_after
 from gestured.core.address import Address
@@ -56,11 +56,9 @@ def run(args: argparse.Namespace) -> int:
                 keeper = Keeper(tape, scene)
                 why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
-    if args.json:
-        say_json(summary | {"ended": why})
-    else:
-        lost = f", {keeper.lost} lost: this disk is too slow" if keeper.lost else ""
-        say(f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}")
+    lost = f", {keeper.lost} lost: this disk is too slow" if keeper.lost else ""
+    words = f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}"
+    tell(args.json, summary | {"ended": why}, words)
     if why == GONE:
         raise Unreachable(f"the daemon closed the connection; {args.file} is good up to there")
     return 1 if keeper.lost else 0

@@ -2,28 +2,34 @@
 
 import argparse
 import json
+import socket
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from gestured.client import osc_out
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
+from gestured.client.sensor import connected, sent_after_refusal
 from gestured.client.values import host_port, number, sensor_name
-from gestured.control.diff import Answer, Knew, Line, Recorded
+from gestured.control.diff import Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
-from gestured.control.sending import send
 from gestured.core import messages
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.own import Own
 from gestured.model.shipped import shipped
 from gestured.record.replay import Maker, Replay
+from gestured.record.tape import Tape
 
 DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
+BUNDLE = b"#bundle\0"
 Playable = Recorded | Labelled
 
 
@@ -71,7 +77,10 @@ def run(args: argparse.Namespace) -> int:
         raise RecordingError(f"{args.file}: holds no packets")
     if args.to is None:
         return _here(args, source)
-    _send(args, source)
+    unheard, count = _send(source.tape, args.to, args.speed), len(source.tape.packets)
+    if unheard:
+        raise GesturedError(f"nobody listened on {args.to} for {unheard} of {count} packets")
+    say(f"sent {count} packets to {args.to}", to=sys.stderr)
     return 0
 
 
@@ -93,7 +102,7 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         another = isinstance(source, Recorded) and ladder.model.sha256 != source.maker.sha256
-        return _compare(args, source, list(lines), _knew(replay), another=another)
+        return _compare(args, source, list(lines), replay.knew, another=another)
     early: dict[str, dict[str, Any]] = {}  # for `readable`
     for line in lines:
         tell(args.json, line, readable(line, early))
@@ -127,16 +136,28 @@ def _recorded_models(path: Path, maker: Maker) -> list[Path]:
     return [shipped()[name] for name in names]
 
 
-def _send(args: argparse.Namespace, source: Playable) -> None:
-    """To a daemon. Raises GesturedError where nobody listens."""
-    unheard, count = send(source.tape, args.to, args.speed), len(source.tape.packets)
-    if unheard:
-        raise GesturedError(f"nobody listened on {args.to} for {unheard} of {count} packets")
-    say(f"sent {count} packets to {args.to}", to=sys.stderr)
+def _send(tape: Tape, to: Address, speed: float) -> int:
+    """Send each packet, so many times as fast; how many were refused by a closed port. Raises GesturedError.
 
-
-def _knew(replay: Replay) -> Knew:
-    return lambda sensor, t: sensor in replay.played and replay.played[sensor].knew(t - replay.epoch)
+    Each sender of the tape gets a socket of its own: a sensor belongs to its source. At another pace than its own a
+    packet says itself when it was felt.
+    """
+    senders: dict[Address, socket.socket] = {}
+    unheard, first, start = 0, tape.packets[0].t_ns, time.monotonic()
+    try:
+        for packet in tape.packets:
+            time.sleep(max(start + (packet.t_ns - first) / 1e9 / speed - time.monotonic(), 0.0))
+            tagged = speed != 1 and not packet.data.startswith(BUNDLE)
+            if packet.source not in senders:
+                senders[packet.source] = connected(to)
+            data = osc_out.dated(packet.t_ns / 1e9, packet.data) if tagged else packet.data
+            unheard += sent_after_refusal(senders[packet.source], data)
+    except OSError as error:  # such as a packet that is longer than UDP allows
+        raise GesturedError(f"a packet for {to} cannot be sent: {error.strerror}") from error
+    finally:
+        for sender in senders.values():
+            sender.close()
+    return unheard
 
 
 def _compare(
@@ -150,16 +171,9 @@ def _compare(
             say(f"{count:5d} x {before} -> {after}", to=sys.stderr)
     for difference in differences:
         if args.json:
-            sides = {"recorded": difference.recorded, "replayed": difference.replayed}
-            say_json({side: answer and _as_dict(answer) for side, answer in sides.items()})
+            say_json({side: answer and answer._asdict() for side, answer in difference._asdict().items()})
         else:
             say_drawn(difference.words())
     early = f", {skipped} before the sensor was known" if skipped else ""
     say(f"{compared}{early}, {len(differences)} differences", to=sys.stderr)
     return 1 if differences else 0
-
-
-def _as_dict(answer: Answer) -> dict[str, object]:
-    return {
-        "sensor": answer.sensor, "onset": answer.onset, "answer": answer.name, "confidence": answer.confidence,
-    }  # fmt: skip

@@ -16,17 +16,15 @@ from gestured.core.frames import Frame
 from gestured.simulator import Act
 from gestured.simulator.places import PLACES
 
-DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor,
-as OSC over UDP, in real time. Says what is performed as it ends, to be compared
-with what the daemon recognises."""
-
 
 def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "simulate",
         help="simulate a sensor that somebody touches",
-        description=DESCRIPTION,
+        description="Send the pressure frames of a simulated person on a simulated textile sensor,\n"
+        "as OSC over UDP, in real time. Says what is performed as it ends, to be compared\n"
+        "with what the daemon recognises.",
         epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
         "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob\n"
         "  gesturectl simulate --everyday seat",

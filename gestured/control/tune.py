@@ -4,6 +4,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -85,7 +86,7 @@ def play(path: Path, model: Model, played: Played) -> None:
     events = [line for line in lines if line["type"] == "gesture"]
     if isinstance(source, Labelled):
         played.seconds += source.seconds
-        played.add(source.performed(), events, lambda t: replay.played["recording"].knew(t - replay.epoch))
+        played.add([*source.performed()], events, partial(replay.knew, "recording"))
     else:
         # A sensor that sends only while it is touched is there in its pauses, but nobody says so for a whole night.
         steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))

@@ -143,6 +143,10 @@ class Replay:
             yield from self._seen(self._hub.tick(now))
         yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
 
+    def knew(self, sensor: str, t: float) -> bool:
+        """Whether a sensor's idle state was known at `t`, in s since 1970, as far as it has been played."""
+        return sensor in self.played and self.played[sensor].knew(t - self.epoch)
+
     def _gate(self, told: Mapping[str, Any]) -> list[Fact]:
         """What the tape tells of a sensor's gates; where that was so before its first packet, of its arming, too."""
         since, until = told["since"] - self.epoch, told.get("until")

@@ -26,7 +26,7 @@ HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"
 LONG = HOSTILE + "y" * 100_000
 DRAWN = {  # modules that say something as it is; each shows foreign words before it draws
     "gestured/client/say.py", "gestured/control/demo.py", "gestured/control/listen.py", "gestured/control/replay.py",
-    "gestured/control/screen.py", "gestured/control/status.py", "gestured/lab/recordings/forget.py",
+    "gestured/control/show.py", "gestured/control/status.py", "gestured/lab/recordings/forget.py",
     "gestured/lab/recordings/terminal.py",
 }  # fmt: skip
 OBEYED = re.compile(r"[^ -~\n\u2026\u2500-\u259f]")  # all but ASCII, what a cut is marked and pictures are drawn with

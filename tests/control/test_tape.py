@@ -174,6 +174,6 @@ def test_differences_match_contacts_by_sensor_and_onset() -> None:
     assert differences([a], [elsewhere]) == [Difference(a, None), Difference(None, elsewhere)]
     assert differences([a, late], [late, near]) == []
     assert differences([a], [unsure]) == [Difference(a, unsure)]
-    assert Difference(a, unsure).names == (a.name, a.name) and Difference(None, a).names == ("nothing", a.name)
+    assert Difference(a, unsure).names == (a.answer, a.answer) and Difference(None, a).names == ("nothing", a.answer)
     assert differences([], [a]) == [Difference(None, a)]
     assert Difference(a, None).words().startswith("- ") and "arm: one_tap 0.900" in Difference(a, None).words()
