@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -90,10 +91,8 @@ class Mqtt:
 
     def _serve(self, until: float | None) -> None:
         """Do what the next message of the inbox says; nothing where none comes until then (monotonic s)."""
-        try:
+        with suppress(queue.Empty):
             self._inbox.get(timeout=None if until is None else max(until - time.monotonic(), 0.0))()
-        except queue.Empty:
-            pass
 
     def _fail(self, error: GesturedError) -> None:
         raise error

@@ -91,7 +91,7 @@ def bind_all(settings: Settings) -> Bound:
         gates = _listener(given, "gates", settings.gates, opened) if asked else None
         close = opened.pop_all().close
     for name, sock in given.items():
-        log.info("socket from systemd", name=name, address=_where(sock))
+        log.info("socket from systemd", name=name, address=name_of(sock))
     return Bound(udp, since, events, control, gates, http, close)
 
 
@@ -120,10 +120,6 @@ def _passed() -> list[tuple[str, socket.socket]]:
     for fd in fds:
         os.set_inheritable(fd, False)
     return [(name, socket.socket(fileno=fd)) for fd, name in zip(fds, names + [""] * int(count), strict=False)]
-
-
-def _where(sock: socket.socket) -> str:
-    return str(sock.getsockname()) if sock.family == socket.AF_UNIX else name_of(sock)
 
 
 def _by_name(passed: Sequence[tuple[str, socket.socket]]) -> dict[str, socket.socket]:

@@ -10,7 +10,7 @@ from typing import Any
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
 from gestured.core.points import STRICTNESS
-from gestured.daemon.merge import load_settings, strange_variables
+from gestured.daemon.merge import from_environment, load_settings
 from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
 EXAMPLE = """\
@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         settings, sources = load_settings(given, os.environ)
         log.configure(settings.log_level)
-        for name in strange_variables(os.environ):
+        for name in from_environment(os.environ)[1]:
             log.log.warning("a variable that is no setting", variable=name)
         if explain:
             from gestured.daemon.explain import explain as describe

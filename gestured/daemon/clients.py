@@ -6,6 +6,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 
 from gestured.core import messages
 from gestured.core.events import Event, Touch
@@ -153,11 +154,8 @@ class EventServer:
             if len(self._clients) >= CLIENTS:
                 self.metrics.evicted.add("too_many")
                 self._throttle.warn("client turned away", "too many clients", limit=CLIENTS)
-                with sock:
-                    try:
-                        sock.send(messages.error_json(f"more than {CLIENTS} clients"))
-                    except OSError:
-                        pass
+                with sock, suppress(OSError):
+                    sock.send(messages.error_json(f"more than {CLIENTS} clients"))
                 continue
             client = Client(self, sock)
             self._clients.add(client)

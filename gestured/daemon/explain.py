@@ -38,13 +38,9 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
 
 def _models(settings: Settings, ladder: Ladder) -> Said:
     model, window = ladder.model, ladder.model.metadata.window
-    yield (
-        LOADS,
-        (
-            f"model {ladder.active}: {model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, "
-            f"sha256 {model.sha256[:12]}, {window.rows}x{window.columns} at {window.rate_hz:g} Hz"
-        ),
-    )
+    what = f"{model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, sha256 {model.sha256[:12]}"
+    made_for = f"{window.rows}x{window.columns} at {window.rate_hz:g} Hz"
+    yield LOADS, f"model {ladder.active}: {what}, {made_for}"
     yield LOADS, f"gestures {', '.join(gestures_in_use(ladder, settings.gestures))}"
     yield LOADS, "numpy, onnxruntime (one thread), uvloop, pydantic, structlog"
     for rung in ladder.rungs[1:]:

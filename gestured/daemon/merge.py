@@ -25,19 +25,15 @@ PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # set by a platform where its value 
 MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
 
 
-def _read(path: str) -> str:
-    with open_regular(path) as file:
-        data = file.read(MAX_CONFIG_BYTES + 1)
-    if len(data) > MAX_CONFIG_BYTES:
-        raise OSError(errno.EFBIG, "is too large", path)
-    return data.decode()
-
-
 def _from_file(path: str) -> dict[str, Any]:
     import tomllib
 
     try:
-        found = tomllib.loads(_read(path))
+        with open_regular(path) as file:
+            data = file.read(MAX_CONFIG_BYTES + 1)
+        if len(data) > MAX_CONFIG_BYTES:
+            raise OSError(errno.EFBIG, "is too large", path)
+        found = tomllib.loads(data.decode())
     except OSError as error:
         limit = f"{MAX_CONFIG_BYTES >> 20} MiB"
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
@@ -57,7 +53,7 @@ def _from_file(path: str) -> dict[str, Any]:
     return found
 
 
-def _from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+def from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
     """Values by key of the variables that are set and not empty, and names of those that are no settings.
 
     What a container platform sets by itself is passed over. Raises SettingsError for one that is nearly a setting.
@@ -78,11 +74,6 @@ def _from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[
         else:
             strange.append(name)
     return found, strange
-
-
-def strange_variables(environ: Mapping[str, str]) -> list[str]:
-    """The variables `GESTURED_*` that are no settings, and that no container platform sets by itself."""
-    return _from_environment(environ)[1]
 
 
 def _near(key: str, known: Sequence[str]) -> str | None:
@@ -128,7 +119,7 @@ def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple
 
     Returns the settings and where each key that was set came from. Raises SettingsError.
     """
-    environment, _ = _from_environment(environ)
+    environment, _ = from_environment(environ)
     path = flags.get("config") or environment.pop("config", None)
     environment.pop("config", None)
     file = _from_file(path) if path else {}

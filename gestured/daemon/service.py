@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from gestured import __version__
@@ -142,11 +143,9 @@ class Service:
                 self._reload = asyncio.create_task(self.reload())  # frames and timers go on meanwhile
             wait = min(period, status_at - now)
             due = time.monotonic() + wait
-            try:
+            with suppress(TimeoutError):
                 async with asyncio.timeout(wait):
                     await stop.wait()
-            except TimeoutError:
-                pass
         if self._reload is not None:
             self._reload.cancel()
         await self._finish()

@@ -82,9 +82,9 @@ def bind_tcp(address: Address) -> socket.socket:
 
 
 def name_of(sock: socket.socket) -> str:
-    """HOST:PORT that an IP socket is bound to."""
-    host, port = sock.getsockname()[:2]
-    return str(Address(host, port))
+    """HOST:PORT that an IP socket is bound to, or the path of a Unix socket."""
+    where = sock.getsockname()
+    return str(where if sock.family == socket.AF_UNIX else Address(*where[:2]))
 
 
 class Listener:

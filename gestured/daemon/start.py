@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -133,10 +134,8 @@ def _end_surely(loop: asyncio.AbstractEventLoop, served: threading.Event) -> Non
 
     def watch() -> None:
         while number := signals.recv(1):
-            try:
+            with suppress(RuntimeError):  # the loop is closed: what is left is the end of the process
                 loop.call_soon_threadsafe(lambda: None)
-            except RuntimeError:
-                pass  # the loop is closed: what is left is the end of the process
             if number[0] in STOPS:
                 time.sleep(END_S)
                 if not served.is_set():

@@ -32,12 +32,13 @@ def expected(problem: Mapping[str, Any]) -> str:
     return message if "expected" in message else "expected " + message
 
 
-def _address(value: object) -> Address:
-    return named(value if isinstance(value, str) else "")
+def _text(value: object) -> str:
+    """The text itself; of anything else an empty one, which is never what was expected."""
+    return value if isinstance(value, str) else ""
 
 
 def _destination(value: object) -> Destination:
-    scheme, _, rest = value.partition("://") if isinstance(value, str) else ("", "", "")
+    scheme, _, rest = _text(value).partition("://")
     try:
         address = named(rest.rstrip("/"))
         if scheme not in SCHEMES or address.port == 0:
@@ -48,15 +49,11 @@ def _destination(value: object) -> Destination:
     return Destination(scheme, address)
 
 
-def _grid(value: object) -> Grid:
-    return Grid.parse(value if isinstance(value, str) else "")
-
-
 def _name(of: str) -> BeforeValidator:
     def checked(value: object) -> str:
-        if not isinstance(value, str) or not is_sensor(value):
+        if not is_sensor(name := _text(value)):
             raise ValueError(f"a {of}'s name, 1 to 64 of A-Z a-z 0-9 _ -")
-        return value
+        return name
 
     return BeforeValidator(checked)
 
@@ -77,11 +74,9 @@ def _named(value: object, expected: str) -> Path:
 
 def _network(value: object) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
     try:
-        if isinstance(value, str):
-            return ipaddress.ip_network(value, strict=False)
+        return ipaddress.ip_network(_text(value), strict=False)
     except ValueError:
-        pass
-    raise ValueError("an address or a network, such as 127.0.0.1, 192.168.7.0/24 or fd00::/8")
+        raise ValueError("an address or a network, such as 127.0.0.1, 192.168.7.0/24 or fd00::/8") from None
 
 
 def _listed(value: object) -> object:
@@ -90,8 +85,8 @@ def _listed(value: object) -> object:
 
 
 Listed = BeforeValidator(_listed)
-AddressField = Annotated[Address, BeforeValidator(_address)]
-GridField = Annotated[Grid, BeforeValidator(_grid)]
+AddressField = Annotated[Address, BeforeValidator(lambda value: named(_text(value)))]
+GridField = Annotated[Grid, BeforeValidator(lambda value: Grid.parse(_text(value)))]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
 DestinationField = Annotated[Destination, BeforeValidator(_destination)]
 SensorName = Annotated[str, _name("sensor")]
