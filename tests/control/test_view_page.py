@@ -254,13 +254,17 @@ def test_a_daemon_that_hangs_is_said_and_seen_again_by_itself(serve, browser: Br
         browser.until("!document.getElementById('recalibrate').disabled")
 
 
-def test_a_program_that_hangs_is_said_and_seen_again_by_itself(start, real: Daemon, browser: Browser) -> None:
+@pytest.mark.parametrize("meanwhile", ["1", "open('')"], ids=["while it streams", "while it is asked"])
+def test_a_program_that_hangs_is_said_and_seen_again_by_itself(
+    start, real: Daemon, browser: Browser, meanwhile: str
+) -> None:
     process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0")
     browser.call("Page.navigate", url=process.stdout.readline().decode().strip())
     said = "document.getElementById('state')?.textContent"
     browser.until(f"{said}?.startsWith('gestured ')")
     process.send_signal(signal.SIGSTOP)
     try:
+        browser.run(meanwhile)
         browser.until(f"{said}.includes('does not answer')")
     finally:
         process.send_signal(signal.SIGCONT)

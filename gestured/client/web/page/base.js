@@ -27,20 +27,19 @@ async function enter() { // throws the reason where the door is closed
   sessionStorage.setItem("secret", door.secret = told.secret);
 }
 
-async function heardOf(reader) { // what comes next; the end where nothing does, since a server that lives says so each 5 s
-  const late = setTimeout(() => reader.cancel().catch(() => {}), SILENT_MS);
-  return reader.read().finally(() => clearTimeout(late));
-}
-
 async function listen(path, signal, hear, lost) { // server-sent events; EventSource sends no header
   while (!signal.aborted) {
     let busy = "";
+    const late = new AbortController(), soon = what => { // a server that lives says so each 5 s
+      const timer = setTimeout(() => late.abort(), SILENT_MS);
+      return what.finally(() => clearTimeout(timer));
+    };
     try {
-      const answer = await ask(path, { signal });
+      const answer = await soon(ask(path, { signal: AbortSignal.any([signal, late.signal]) }));
       if (answer.status === 503) throw new Error(busy = await answer.text()); // there is no place now
       if (!answer.ok) { lost(await answer.text()); return; }
       const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
-      for (let rest = "", part; !(part = await heardOf(reader)).done;) {
+      for (let rest = "", part; !(part = await soon(reader.read())).done;) {
         const blocks = (rest + part.value).split("\n\n");
         rest = blocks.pop();
         for (const block of blocks) {
