@@ -70,8 +70,6 @@ class Desk:
                 self.models_failed = False
             elif isinstance(event, Cancelled) and event.reason == "model":
                 self.models_failed = True
-        elif isinstance(event, Gesture):
-            self._metrics.tests.add()
         if isinstance(event, Gesture | Unknown | Cancelled):
             self.recent.append(_answer(event, epoch, test))
         if not isinstance(event, Status):

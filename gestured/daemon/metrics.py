@@ -99,7 +99,6 @@ class Metrics:
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result", dated=True)
         self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get", dated=True)
         self.evicted = Counter("gestured_clients_evicted", "Clients cut off or turned away", "reason", dated=True)
-        self.tests = Counter("gestured_test_events", "Gestures that gesturectl emit made up")
         self.inference = Histogram(
             "gestured_inference_seconds",
             "Time to classify a segment that was decided",

@@ -56,7 +56,6 @@ def status(parts: Parts) -> dict[str, Any]:
             "unknown": metrics.unknown.total(),
             "suppressed": _by_label(metrics.suppressed.values),
             "cancelled": _by_label(metrics.cancelled.values),
-            "tests": metrics.tests.total(),
         },
         "provisional": {"given": 0, "confirmed": 0, "revoked": 0} | _by_label(metrics.provisional.values),
         "shift": {
