@@ -24,6 +24,27 @@ SETUPS |= {f"turned{n}": Setup((4, 7), Mounting(rotate=90, mirror=True, invert=T
 SETUPS |= {f"clock{n}": Setup(clock="sensor") for n in range(EACH)}
 SCENE = Scene(GESTURES, (9, 9), sensors=SETUPS, max_sensors=64)
 Read = tuple[float, list[tuple[str, bytes]]]  # s, and the packets that wait then, with their sensors' names
+PLAIN = [f"plain{n}" for n in range(EACH)]
+
+
+def packed(names: Sequence[str], values: NDArray[np.float64]) -> list[bytes]:
+    """A packet for each of some sensors, whose counts are the rows."""
+    return [
+        encoding.message(f"/{name}/pressure", "f" * 81, one.tolist()) for name, one in zip(names, values, strict=True)
+    ]
+
+
+@pytest.fixture
+def passed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Of each frame that a bank looks at, whether it takes it."""
+    found, take = list[bool](), Bank._take
+
+    def watched(*given: Any) -> NDArray[np.bool_]:
+        found.extend(taken := take(*given))
+        return taken
+
+    monkeypatch.setattr(Bank, "_take", watched)
+    return found
 
 
 def frames(setup: Setup, rng: np.random.Generator) -> Iterator[NDArray[np.float64] | None]:
@@ -106,14 +127,7 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    passed, take = list[bool](), Bank._take
-
-    def watched(*given: Any) -> NDArray[np.bool_]:
-        passed.extend(taken := take(*given))
-        return taken
-
-    monkeypatch.setattr(Bank, "_take", watched)
+def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, passed: list[bool]) -> None:
     arrived = reads(seed)
     alone, known_alone = play(arrived, together=False)
     assert passed == []
@@ -125,16 +139,12 @@ def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: 
 
 def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
     """So slowly that no frame of it is a touch: only the review of the noise can find it."""
-    names, rng, arrived = [f"plain{n}" for n in range(EACH)], np.random.default_rng(0), list[Read]()
+    rng, arrived = np.random.default_rng(0), list[Read]()
     for k in range(2400):
         loud = np.ones((EACH, 81))
         loud[:3, 40] = np.exp(k / 600)
         values = np.rint(100 + 20 * loud * rng.normal(0, 1, loud.shape))
-        packets = [
-            (name, encoding.message(f"/{name}/pressure", "f" * 81, one.tolist()))
-            for name, one in zip(names, values, strict=True)
-        ]
-        arrived.append((k / 15, packets))
+        arrived.append((k / 15, list(zip(PLAIN, packed(PLAIN, values), strict=True))))
     said, known = play(arrived, together=True)
     assert repr((said, known)) == repr(play(arrived, together=False))
     assert sum("bad_taxels=1" in str(one) for one in known) > 10
@@ -152,11 +162,7 @@ def test_a_sensor_that_sends_on_is_no_longer_intermittent(missed: int | None, mo
         hub, rng, states = Hub(Scene(GESTURES, (9, 9)), Sure()), np.random.default_rng(0), list[str]()
         for k in range(450):
             if k >= 225 or k % 75 < 45:
-                values = rng.normal(100.0, 2.0, (EACH, 81)).tolist()
-                packets = [
-                    encoding.message(f"/{name}/pressure", "f" * 81, one)
-                    for name, one in zip(names, values, strict=True)
-                ]
+                packets = packed(names, rng.normal(100.0, 2.0, (EACH, 81)))
                 if k == missed:
                     hub.missed()
                 hub.receive([(packet, SOURCE) for packet in packets], k / 15)
@@ -167,21 +173,13 @@ def test_a_sensor_that_sends_on_is_no_longer_intermittent(missed: int | None, mo
     assert said[0] == said[1]
 
 
-def test_a_dip_of_a_moment_does_not_keep_sensors_out_of_a_bank(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dip_of_a_moment_does_not_keep_sensors_out_of_a_bank(passed: list[bool]) -> None:
     """Interference pulls a taxel of each far below its baseline: a second later they are taken together again."""
-    passed, take = list[bool](), Bank._take
-
-    def watched(*given: Any) -> NDArray[np.bool_]:
-        passed.extend(taken := take(*given))
-        return taken
-
-    monkeypatch.setattr(Bank, "_take", watched)
     rng, hub, alike = np.random.default_rng(0), Hub(SCENE, Sure()), list[int]()
     for k in range(90):
         values = rng.normal(100, 2, (EACH, 81))
         values[:, 40] -= 100.0 * (k == 45)
-        packets = [encoding.message(f"/plain{n}/pressure", "f" * 81, one.tolist()) for n, one in enumerate(values)]
-        hub.receive([(packet, SOURCE) for packet in packets], k / 15)
+        hub.receive([(packet, SOURCE) for packet in packed(PLAIN, values)], k / 15)
         alike.append(passed.count(True))
     assert alike[44] - alike[34] == alike[89] - alike[79] == 10 * EACH
 
@@ -190,10 +188,7 @@ def test_a_sensor_that_sends_is_not_stale_between_two_ticks() -> None:
     """The daemon ticks four times a second, and a sensor may count as gone after less."""
     hub, rng, names = Hub(Scene(GESTURES, (9, 9), stale_s=0.2), Sure()), np.random.default_rng(0), set[str]()
     for k in range(300):
-        packets = [
-            encoding.message(f"/s{n}/pressure", "f" * 81, one)
-            for n, one in enumerate(rng.normal(100.0, 2.0, (EACH, 81)).tolist())
-        ]
+        packets = packed(PLAIN, rng.normal(100.0, 2.0, (EACH, 81)))
         hub.receive([(packet, SOURCE) for packet in packets], k / 15)
         if k % 4 == 3:
             hub.tick(k / 15)
@@ -212,10 +207,7 @@ def test_a_sensor_whose_frames_no_bank_can_take_does_not_go_in_and_out(
     hub, rng, entered, enter = Hub(SCENE, Sure()), np.random.default_rng(0), list[str](), Bank.enter
     monkeypatch.setattr(Bank, "enter", lambda one, sensor: (entered.append(sensor.name), enter(one, sensor))[1])
     for k in range(60):
-        packets = [
-            encoding.message(f"/clock{n}/pressure", "f" * 81, one)
-            for n, one in enumerate(rng.normal(100.0, 2.0, (EACH, 81)).tolist())
-        ]
+        packets = packed([f"clock{n}" for n in range(EACH)], rng.normal(100.0, 2.0, (EACH, 81)))
         packets = [encoding.bundle([packet], 1.7e9 + k / 15 if tagged else None) for packet in packets]
         hub.receive([(packet, SOURCE) for packet in packets], k / 15)
     assert sorted(entered) == ([f"clock{n}" for n in range(EACH)] if tagged else [])
@@ -245,11 +237,7 @@ def test_sensors_of_any_rate_are_served(rate_hz: float) -> None:
     hub, names, seconds = Hub(scene, Sure()), [f"s{n}" for n in range(EACH)], 2 + 50 / rate_hz
     for k in range(int(seconds * rate_hz)):
         values = rng.normal(100.0, 2.0, (EACH, 81))
-        packets = [
-            encoding.message(f"/{name}/pressure", "f" * 81, one.tolist())
-            for name, one in zip(names, values, strict=True)
-        ]
-        found = hub.receive([(packet, SOURCE) for packet in packets], k / rate_hz)
+        found = hub.receive([(packet, SOURCE) for packet in packed(names, values)], k / rate_hz)
         faults += [fact for fact in found if isinstance(fact, Fault)]
     hub.tick(k / rate_hz)
     assert faults == []
@@ -269,21 +257,16 @@ def test_a_bug_in_a_pass_costs_no_frame(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_bug_in_one_sensor_is_its_own(broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever happens to what is known of a sensor, the others are served in the same read, and stay as they are."""
     hub, rng, faults = Hub(SCENE, Sure()), np.random.default_rng(0), list[Fault]()
-    names = [name for name in SETUPS if name.startswith("plain")]
     for n in range(60):
-        values = rng.normal(100.0, 2.0, (len(names), 81))
+        values = rng.normal(100.0, 2.0, (len(PLAIN), 81))
         values[3, 40] += 500 * (n >= 30)  # touched, it has to leave its bank
-        packets = [
-            encoding.message(f"/{name}/pressure", "f" * 81, one.tolist())
-            for name, one in zip(names, values, strict=True)
-        ]
         if n == 30:
             monkeypatch.setattr(hub._sensors["plain3"], broken, None)
-        found = hub.receive([(packet, SOURCE) for packet in packets], n / 15)
+        found = hub.receive([(packet, SOURCE) for packet in packed(PLAIN, values)], n / 15)
         faults += [fact for fact in found if isinstance(fact, Fault)]
         taken = {name: fact.taken for fact in found if isinstance(fact, Arrived) for name in fact.sensors}
         assert {name: count for name, count in taken.items() if name != "plain3"} == dict.fromkeys(
-            (name for name in names if name != "plain3"), 1
+            (name for name in PLAIN if name != "plain3"), 1
         )
     assert {fact.sensor for fact in faults} <= {None, "plain3"} and "plain3" in {fact.sensor for fact in faults}
-    assert all(hub._sensors[name].front_end.ready for name in names if name != "plain3")
+    assert all(hub._sensors[name].front_end.ready for name in PLAIN if name != "plain3")

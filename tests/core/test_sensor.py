@@ -122,29 +122,6 @@ def cut_late(stream: Sequence[Frame]) -> list[Segment]:
         return [x.segment for x in cut_out(stream) if isinstance(x, Cut)]
 
 
-@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP)])
-def test_no_frame_changes_what_the_time_has_decided(lines: tuple[str, ...]) -> None:
-    """A finger that comes back in the very frame that is due comes too late, and begins anew."""
-    stream = frames("quiet for 1500ms", *lines, "quiet for 900ms")
-    decided = next(n for n in range(len(stream)) if any(isinstance(x, Cut) for x in cut_out(stream[: n + 1])))
-    pressed = next(frame for frame in stream if frame.t >= touch_of(stream))
-    late = [*stream[:decided], replace(stream[decided], values=pressed.values)]
-    one, other = cut_out(stream[: decided + 1]), cut_out(late)
-    assert kinds(one) == ["Opened", "Cut", "Ended"]
-    assert kinds(other) == ["Opened", "Cut", "Ended", "Opened"]
-    for expected, found in zip(one, other[:3], strict=True):
-        if isinstance(expected, Cut) and isinstance(found, Cut):
-            assert np.array_equal(expected.segment.frames, found.segment.frames)
-            assert expected.decided == found.decided
-        else:
-            assert expected == found
-
-
-def touch_of(stream: Sequence[Frame]) -> float:
-    """When the last contact of a stream was touched last, in s."""
-    return max(x.segment.offset for x in cut_out(stream) if isinstance(x, Cut))
-
-
 # --- what nobody saw
 
 
