@@ -50,14 +50,6 @@ def three(clock: Clock) -> list[Fake]:
     return [Fake(name, clock) for name in ("best", "second", "third")]
 
 
-def test_best_rung_answers_alone(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock)
-    scores = ladder.classify(segment())
-    assert (scores.model, scores.degraded) == ("best", False)
-    assert [len(rung.seen) for rung in three] == [1, 0, 0]
-    assert (ladder.active, ladder.degraded) == ("best", False)
-
-
 @pytest.mark.parametrize("how", [ModelError("broken"), RuntimeError("worse"), None])
 def test_failing_rung_hands_the_same_segment_on(three: list[Fake], clock: Clock, how: Exception | None) -> None:
     three[0].error = how

@@ -14,7 +14,6 @@ from tests.bridge.conftest import emit
 from tests.bridge.test_mqtt import begin
 from tests.bridge.test_serial import Out
 from tests.bridge.test_zenoh import site
-from tests.control.conftest import ROOT
 from tests.daemon.harness import Daemon
 from tests.documents.blocks import blocks
 
@@ -29,9 +28,8 @@ def consumer(phrase: str) -> str:
 
 def heard(code: str, *daemons: Daemon) -> set[str]:
     """What a consumer prints first of each daemon, while somebody swipes again and again."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     lines: set[str] = set()
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         os.set_blocking(process.stdout.fileno(), False)
         try:
             while len(lines) < len(daemons):
@@ -77,7 +75,7 @@ def test_the_zenoh_sender(bridge, site, fake, udp):
     fake.accept()
     process.ready()
     code = consumer("declare_publisher").replace("tcp/192.168.7.2:7447", site.endpoint).replace("car7", "car")
-    with subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}) as sender:
+    with subprocess.Popen([sys.executable, "-c", code]) as sender:
         out = Out(udp)
         first, second = out.next(), out.next()
         sender.kill()

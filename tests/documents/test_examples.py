@@ -98,11 +98,15 @@ class Place:
             assert process.stdout is not None
             return next(line for line in process.stdout if "swipe" in line)
 
+    def ran(self, phrase: str) -> "subprocess.CompletedProcess[str]":
+        """An example that ends by itself."""
+        command = [sys.executable, "-c", example(phrase).text]
+        return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=60)
+
     @contextmanager
     def running(self, *command: str) -> "Iterator[subprocess.Popen[str]]":
         """A program that never ends, until it is no longer needed."""
-        environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder, env=environment) as process:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder) as process:
             try:
                 yield process
             finally:
@@ -147,10 +151,18 @@ def test_a_loop_in_a_shell_goes_on(place: Place):
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def test_python_subscriber(place: Place):
+@pytest.mark.parametrize(
+    ("phrase", "says"),
+    [
+        ("across its restarts", "armrest swipe_left 1.00 0 missed\n"),
+        ("BlockingOSCUDPServer", "armrest swipe_left 1.00 "),
+        ('sensors=["armrest"]) as events', "swipe_left from armrest\n"),
+    ],
+)
+def test_python_subscriber(place: Place, phrase: str, says: str):
     with place.gestures():
-        line = place.first_line(sys.executable, "-c", place.here(example("across its restarts").text))
-    assert line == "armrest swipe_left 1.00 0 missed\n"
+        line = place.first_line(sys.executable, "-c", place.here(example(phrase).text))
+    assert line.startswith(says)
 
 
 @COMPILERS
@@ -158,18 +170,6 @@ def test_c_subscriber(place: Place, tmp_path: Path, compiler: str, standard: str
     program = c_program(tmp_path, "gestured_open", compiler, standard)
     with place.gestures():
         assert place.first_line(program, str(place.daemon.socket)) == "armrest swipe_left 1.00\n"
-
-
-def test_osc_subscriber(place: Place):
-    with place.gestures():
-        line = place.first_line(sys.executable, "-c", place.here(example("BlockingOSCUDPServer").text))
-    assert line.startswith("armrest swipe_left 1.00 ")
-
-
-def test_a_subscriber_that_connects_again(place: Place):
-    with place.gestures():
-        line = place.first_line(sys.executable, "-c", place.here(example('sensors=["armrest"]) as events').text))
-    assert line == "swipe_left from armrest\n"
 
 
 def test_a_subscriber_that_does_something_before_the_answer(place: Place):
@@ -203,17 +203,13 @@ def test_one_sensor_in_a_process_of_ones_own(place: Place):
     hand = Hand()
     frames = np.array([*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0), *hand.swipe("up"), *hand.idle(1.0)])
     np.savez(place.folder / "session.npz", frames=frames, times=np.arange(len(frames)) / RATE_HZ)
-    command = [sys.executable, "-c", example("np.load").text]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    done = place.ran("np.load")
     assert done.returncode == 0, done.stderr
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["swipe_left", "swipe_up"]
 
 
 def test_one_sensor_with_several_zones(place: Place):
-    command = [sys.executable, "-c", example("zones=zones").text]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    done = place.ran("zones=zones")
     said = {tuple(line.split()[:2]) for line in done.stdout.splitlines()}
     assert {zone for zone, _ in said} == {"volume", "lamp", "window"}, done.stderr
     assert {gesture for zone, gesture in said if zone == "volume"} == {"swipe_left", "swipe_right"}
@@ -221,9 +217,7 @@ def test_one_sensor_with_several_zones(place: Place):
 
 
 def test_one_sensor_that_must_be_armed(place: Place):
-    command = [sys.executable, "-c", example("arming={").text]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    done = place.ran("arming={")
     before, after = (done.stdout.partition("unknown: inhibited door") if done.stdout else ("", done.stderr, ""))[::2]
     assert "unknown: disarmed\ndouble_tap\nswipe_left\n" in before, done.stderr
     assert set(after.split("\n")) <= {"", "unknown: inhibited door"}
