@@ -51,13 +51,10 @@ def test_a_zone_is_asked_for_where_something_has_a_place() -> None:
     ("line", "says"),
     [
         (b"", "JSON"),
-        (b"hello", "JSON"),
         (b"\xff", "UTF-8"),
         (b"[" * 4000, "JSON"),
-        (b'{"a":' * 800, "JSON"),
         (b" " * 5000, "4096"),
         (b"[]", '"subscribe"'),
-        (b"NaN", '"subscribe"'),
         (b"{}", '"subscribe"'),
         (b'{"subscribe":[]}', '"subscribe"'),
         (b'{"subscribe":{},"x":1}', '"subscribe"'),

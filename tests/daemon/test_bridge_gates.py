@@ -103,9 +103,7 @@ def test_it_knows_inhibit_and_allow_alone_and_refuses_what_is_not_its_own(bridge
     for request, words in (
         ({"gate": "seat"}, "gate 'seat' is not car's own, expected car, or car- and more"),
         ({"gate": "cargo"}, "gate 'cargo' is not car's own"),
-        ({"gate": "car/door"}, 'expected a gate\'s name, 1 to 64 of A-Z a-z 0-9 _ -, found "car/door"'),
         ({"gate": "car", "sensor": "elbow"}, "no sensor 'elbow', expected one of armrest"),
-        ({"gate": "car", "seconds": 0}, "inhibit.seconds: expected greater than 0, found 0"),
         ({"gate": "car", "seconds": None}, "inhibit.seconds: expected a valid number, found null"),
     ):
         with pytest.raises(Refused) as refused:
