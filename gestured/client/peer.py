@@ -44,13 +44,9 @@ def _given_to(folder: Path) -> int | None:
         above = [parent.lstat() for parent in folder.parents]
     except OSError:
         return None
-    if all(stat.S_ISDIR(one.st_mode) for one in (found, *above)) and all(_roots_alone(one) for one in above):
-        return found.st_uid
-    return None
-
-
-def _roots_alone(found: os.stat_result) -> bool:
-    return found.st_uid == 0 and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    folders = all(stat.S_ISDIR(one.st_mode) for one in (found, *above))
+    roots = all(one.st_uid == 0 and not one.st_mode & (stat.S_IWGRP | stat.S_IWOTH) for one in above)
+    return found.st_uid if folders and roots else None
 
 
 def _name(uid: int) -> str:

@@ -69,7 +69,9 @@ class _Reading:
             source = record.metadata.get("source") if topic == PACKETS else None
             self._channels[record.id] = topic, NOBODY if source is None else _source(source)
         elif isinstance(record, Metadata) and record.name == SCENE:
-            self.scene = _scene(record.metadata)
+            self.scene = json_object(record.metadata.get("json", ""))
+            if self.scene is None:
+                raise _Wrong(f"metadata {SCENE!r}: expected a JSON object, as gesturectl record writes it")
 
     def _message(self, message: Any, budget: Budget) -> None:
         if message.channel_id not in self._channels:
@@ -84,23 +86,11 @@ class _Reading:
             self.packets.append(Packet(message.log_time, source, data))
         elif topic == EVENTS:
             budget.spend(ITEM_COSTS + EVENT_COSTS * len(data))
-            self.events.append(_event(data, len(self.events) + 1))
-
-
-def _scene(metadata: Mapping[str, str]) -> Mapping[str, Any]:
-    found = json_object(metadata.get("json", ""))
-    if found is None:
-        raise _Wrong(f"metadata {SCENE!r}: expected a JSON object, as gesturectl record writes it")
-    return found
-
-
-def _event(line: bytes, number: int) -> Mapping[str, Any]:
-    """A line of the event stream, as sound as one that a daemon sends."""
-    event = json_object(line)
-    wrong = "expected a JSON object" if event is None else wrong_field(event)
-    if event is None or wrong is not None:
-        raise _Wrong(f"event {number}: {wrong}")
-    return event
+            event = json_object(data)  # as sound as a line that a daemon sends
+            wrong = "expected a JSON object" if event is None else wrong_field(event)
+            if event is None or wrong is not None:
+                raise _Wrong(f"event {len(self.events) + 1}: {wrong}")
+            self.events.append(event)
 
 
 def _source(text: str) -> Address:
