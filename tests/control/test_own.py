@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from gestured.control.cli import main
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.test_own import Performer, ready
@@ -87,14 +86,6 @@ def test_ctrl_c_before_the_daemon_has_begun_gives_up_too(start, fake: FakeDaemon
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 1
     waiting.close()
-
-
-@pytest.mark.parametrize("name", ["use", "Slash", "a" * 33])
-def test_a_name_that_cannot_be_is_a_mistake_of_usage(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["enrol", name, "--sensor", "armrest"])
-    assert ended.value.code == 2
-    assert "expected a-z" in capsys.readouterr().err
 
 
 def test_a_tape_holds_own_gestures_and_gates_and_replays_to_the_same_events(

@@ -1,6 +1,5 @@
 """What `gesturectl sniff` makes of packets: forms that are not taken, counters, grids, counts that fall."""
 
-import json
 import re
 import tomllib
 from typing import Any
@@ -79,16 +78,6 @@ def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
     assert valid(proposed, tmp_path) == {"arm": ((12, 6), False)} and "rows and columns" in "\n".join(proposed)
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_counts_that_fall(tmp_path, sign: float) -> None:
-    sight = seen(counted("/arm/pressure", frame, n) for n, frame in enumerate(swipes(9, 9, sign)))
-    proposed = propose(sight.rows())
-    if sign > 0:
-        assert proposed == ["the defaults fit what arrives"]
-    else:
-        assert valid(proposed, tmp_path) == {"arm": (None, True)}
-
-
 @pytest.mark.parametrize(("types", "words"), [("d", "doubles"), ("[f", "arrays"), ("h", "64-bit integers")])
 def test_what_is_not_taken_is_named(types: str, words: str) -> None:
     frame = [float(v) if types != "h" else int(v) for v in Hand().frame().ravel()]
@@ -141,9 +130,3 @@ def test_sniff_says_what_may_be_wrong(run) -> None:
     for n, source in enumerate(("a:1", "a:2", "a:2")):
         two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
     assert "has several senders" in "\n".join(lines(two, []))
-
-
-def test_sniff_on_a_port_of_its_own(sniffed) -> None:
-    status, out, _ = sniffed([floats("/textile/arm/matrix", Hand().frame(), 0)], "--json")
-    (message,) = json.loads(out)["messages"]
-    assert (message["address"], message["types"], status) == ("/textile/arm/matrix", "f*81", 0)
