@@ -179,12 +179,11 @@ def _round(row: float, column: float, radius: float, amplitude: float) -> Finger
 class Player:
     """Plays a scenario. `seed` decides noise, jitter and when the sensor samples within its period.
 
-    Times are multiples of 2**-20 s, so that a `start` of whole seconds shifts them without rounding.
+    Times are multiples of 2**-20 s.
     """
 
     scenario: Scenario
     seed: int = 0
-    start: float = 0.0  # s
     events: list[Found] = field(default_factory=list)
     segment: Segment | None = None  # the last one
 
@@ -230,7 +229,7 @@ class Player:
                 continue
             values = self._shown(step, (t - begin) / step.seconds, t)
             late = min(abs(self._rng.normal(0, sensor.jitter)), 0.9 / sensor.rate) if sensor.jitter else 0.0
-            yield Frame(self.start + _exact(t + late), values, (), self._lost)
+            yield Frame(_exact(t + late), values, (), self._lost)
             self._lost = 0
         self._now = end
 
@@ -287,7 +286,7 @@ class Player:
         elif step.verb == "forget":
             self.events = []
         elif step.verb == "end":
-            self._note(front_end.flush(self.start + _exact(self._now)))
+            self._note(front_end.flush(_exact(self._now)))
         elif step.verb == "expect":
             self._expect(step)
         elif step.verb == "check":

@@ -1,4 +1,4 @@
-"""The segmenter's table: complete, without rows for nothing, and the same in ARCHITECTURE.md."""
+"""The segmenter's table: complete, and the same in ARCHITECTURE.md."""
 
 from itertools import pairwise
 from pathlib import Path
