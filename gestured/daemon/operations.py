@@ -157,7 +157,7 @@ def scene(parts: Parts) -> dict[str, Any]:
     return {
         "version": __version__,
         "instance": parts.instance,
-        "epoch_ns": time.time_ns() - time.monotonic_ns(),
+        "epoch_ns": parts.taps.epoch_ns,
         "model": {
             "name": parts.ladder.active,
             "sha256": model.sha256,

@@ -38,6 +38,7 @@ class Taps:
         self._timer: asyncio.Handle | None = None
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
         self.held_bytes = 0  # in the ring
+        self._epoch_ns = 0  # of the live taps
         self._gates: dict[str, bytes] = {}  # by sensor: the line that said what it listened to where the ring begins
 
     @property
@@ -50,9 +51,18 @@ class Taps:
         """How many live taps there are."""
         return len(self._live)
 
+    @property
+    def epoch_ns(self) -> int:
+        """From the loop's clock to 1970. While anybody taps it stays, whatever the wall clock does.
+
+        So the events of a recording stand where its packets do, even if the machine has slept meanwhile.
+        """
+        return self._epoch_ns if self._live else time.time_ns() - time.monotonic_ns()
+
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
         self.flush()
+        self._epoch_ns = self.epoch_ns
         connection.streams, connection.flush = True, self.flush
         self._live.append(connection)
 
@@ -68,7 +78,7 @@ class Taps:
         Touch events are left out as well, since the packets say the same.
         """
         if self.active and not test and not isinstance(event, Status | Touch):
-            line = messages.to_json(event, epoch)
+            line = messages.to_json(event, self.epoch_ns / 1e9)
             self._remember(time.monotonic_ns(), len(line), line)
 
     def flush(self) -> None:

@@ -65,6 +65,30 @@ def test_the_wall_clock_may_step_by_an_hour(start, tmp_path: Path) -> None:
         assert after["offset"] - after["onset"] == pytest.approx(6 / 15, abs=1e-3)  # no event stands on both sides
 
 
+def test_a_tape_keeps_to_one_clock_when_the_wall_clock_steps_while_it_is_written(start, tmp_path: Path) -> None:
+    """As it does when the machine has slept: what is recorded stands where its packets stand."""
+    clock = tmp_path / "clock"
+    clock.write_text("0")
+    daemon = start("--clock", "sensor", "--flight-recorder", "1", env=injected(HOSTILE_CLOCK=clock))
+    sensor = Sensor(daemon, "arm").begin()
+    with daemon.control() as live, daemon.control() as later:
+        epoch_ns = live.ask("tap")["epoch_ns"]
+        clock.write_text("3600")
+        sensor.perform("left")
+        lines, last_ns = live.lines(), 0
+        for line in lines:
+            if line["type"] == "packet":
+                last_ns = line["t_ns"]
+            elif line["type"] == "gesture":
+                break
+        assert line["decided"] == pytest.approx((last_ns + epoch_ns) / 1e9, abs=60)
+        assert later.ask("flight")["epoch_ns"] == epoch_ns  # it holds the same lines
+    while daemon.ask("status")["taps"]:
+        pass  # it has not noticed yet that the tap is gone
+    with daemon.control() as alone:
+        assert alone.ask("tap")["epoch_ns"] - epoch_ns == pytest.approx(3600e9, abs=60e9)
+
+
 def test_the_sensors_clock_may_step_by_an_hour(start) -> None:
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
     client = daemon.client().subscribe(*TYPES)

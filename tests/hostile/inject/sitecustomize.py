@@ -10,8 +10,9 @@ import time
 from pathlib import Path
 
 if path := os.environ.get("HOSTILE_CLOCK"):
-    real = time.time
+    real, real_ns = time.time, time.time_ns
     time.time = lambda: real() + float(Path(path).read_text() or 0)
+    time.time_ns = lambda: real_ns() + round(1e9 * float(Path(path).read_text() or 0))
 
 if asked := os.environ.get("HOSTILE_NAMES"):
     look_up = socket.getaddrinfo
