@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import gestured
-from gestured.control.status import RATES, span
+from gestured.control.status import RATES, own_faults, span
 from gestured.core.errors import ModelError
 from gestured.core.timing import outside as rate_is_outside
 from gestured.model.opening import check
@@ -71,7 +71,7 @@ def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iter
         what = "what arrives does not fit the settings, and is dropped"
         yield Finding("bad", what, "\n".join(["set in the configuration file, then gesturectl reload:", *proposed]))
     yield from examine_sensors(status)
-    for look in (_shift, _output):
+    for look in (_own, _shift, _output):
         yield from look(status)
 
 
@@ -196,6 +196,14 @@ def _gates(status: dict[str, Any]) -> Iterator[Finding]:
         yield Finding(
             "bad", what, f"does the bridge run, and its bus? To open it: gesturectl allow --all --gate {gate}"
         )
+
+
+def _own(status: dict[str, Any]) -> Iterator[Finding]:
+    for said in own_faults(status):
+        remedy = "gesturectl forget NAME, or another model"
+        if said == status["own"]["fault"]:  # where it cannot be written, it says itself what to do
+            remedy = "" if "--own-gestures" in said else "mend or remove the file, then gesturectl reload"
+        yield Finding("warn", f"own gestures: {said}", remedy)
 
 
 def _shift(status: dict[str, Any]) -> Iterator[Finding]:

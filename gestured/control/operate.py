@@ -8,6 +8,7 @@ from typing import Any
 from gestured.client.program import Commands, Parser
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
+from gestured.control.status import own_faults
 
 
 def add(commands: Commands) -> None:
@@ -124,7 +125,7 @@ def _known(answer: dict[str, Any]) -> Iterable[str]:
     yield from (f"{name:<32} your own, {count} examples" for name, count in own["gestures"].items())
     if not own["gestures"]:
         yield "none of your own"
-    yield from (f"  {said}" for said in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]) if said)
+    yield from (f"  {said}" for said in own_faults(answer))
 
 
 # Verb -> what the daemon's answer says, in lines for a person.

@@ -128,6 +128,15 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     )
     yield f"loop: {1000 * status['loop_lag_s']:.0f} ms late, {status['internal_errors']} bugs caught"
     yield f"shift: {_shift(status['shift'])}"
+    yield from (f"own gestures: {said}" for said in own_faults(status))
+
+
+def own_faults(status: dict[str, Any]) -> list[str]:
+    """What keeps the user's own gestures from being known, or told apart: a sentence each."""
+    own = status.get("own")  # a daemon of before has none
+    if own is None:
+        return []
+    return [said for said in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]) if said]
 
 
 def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:

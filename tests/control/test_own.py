@@ -3,9 +3,11 @@
 import json
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from gestured.control.status import own_faults
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.test_own import Performer, ready
@@ -115,3 +117,24 @@ def test_a_tape_holds_own_gestures_and_gates_and_replays_to_the_same_events(
     answers = [one.get("gesture") or one["reason"] for one in events if one["type"] in ("gesture", "unknown")]
     assert answers == ["inhibited", "slash", "confidence", "swipe_up", "slash"]
     assert ctl("forget", "slash")[0] == 0
+
+
+def test_status_and_doctor_say_what_is_wrong_with_own_gestures(run, serve, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text("{")
+    daemon = serve("--own-gestures", path)
+    status, out, _ = run("status", "--control", daemon.ready["control"])
+    assert status == 0
+    assert f"own gestures: {path}: is no file of own gestures: " in out
+    _, out, _ = run("doctor", "--json", "--control", daemon.ready["control"])
+    (found,) = [one for one in map(json.loads, out.splitlines()) if "own gestures" in one["what"]]
+    assert found["level"] == "warn"
+    assert f"{path}: is no file" in found["what"]
+    assert "gesturectl reload" in found["remedy"]
+
+
+def test_own_gestures_that_are_off_or_alike_are_said() -> None:
+    own = {"fault": None, "gestures": {"slash": 3}, "off": "forest has no embedding", "doubtful": ["a is like b"]}
+    assert own_faults({"own": own}) == ["forest has no embedding", "a is like b"]
+    assert own_faults({"own": own | {"gestures": {}, "doubtful": []}}) == []
+    assert own_faults({}) == []
