@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gestured.bridge.options import BridgeError, peer_address
+from gestured.core.messages import quoted
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 BROKER_S = 5.0  # s that the broker may take to answer a call
@@ -21,6 +22,7 @@ REFUSALS = {
     135: f"this user may not connect: {_LOGIN}",
     138: "we are banned: ask whoever runs it",
     142: "another bridge has the same name, {host}: give each its own with --host",
+    154: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
 }
 CLOSED, SILENT = 128, 141  # the codes that the library gives where the broker named none, or said nothing for too long
 
@@ -35,7 +37,9 @@ class Broker:
         except argparse.ArgumentTypeError as error:
             raise BridgeError(f"--broker {error}") from None
         self._host, self._prefix = host, args.discovery
-        self._user, self._password = os.environ.get("MQTT_USER"), os.environ.get("MQTT_PASSWORD")
+        if not self._prefix or set("#+\0") & set(self._prefix) or not self._prefix.isprintable():
+            raise BridgeError(f"--discovery {quoted(self._prefix)}: expected the beginning of a topic, without # and +")
+        self._user, self._password = _variable("MQTT_USER"), _variable("MQTT_PASSWORD")
         if args.gates is not None and self._user is None and args.cert is None:
             raise BridgeError(f"--gates: a broker that knows nobody may close no gate: {_LOGIN}, or name a --cert")
         self._tls = tls_context(args)
@@ -77,8 +81,11 @@ class Broker:
         client.connect(self.address.host, self.address.port, KEEPALIVE_S, clean_start=True, properties=most)
         client.loop_start()
 
-    def why(self, error: Any) -> str:
-        """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help."""
+    def why(self, error: Any, *, soon: bool) -> str:
+        """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help.
+
+        `soon`: the broker had just let us in.
+        """
         said, code = str(error), getattr(error, "value", 0)
         if "CERTIFICATE_VERIFY_FAILED" in said:
             wrong = said.partition("verify failed: ")[2].partition(" (_ssl")[0] or said
@@ -90,7 +97,10 @@ class Broker:
             raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
         if code == SILENT or "timed out" in said:
             return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
-        return "it closed the connection" if code == CLOSED else said
+        if code != CLOSED:
+            return said
+        who = f" at once: does another bridge have the name gestured-{self._host}? (--host)" if soon else ""
+        return f"it closed the connection{who}"
 
     def hear(self, client: Any, topic: str) -> None:
         """Subscribe to commands: none that is retained, and each with the word whether it shall be."""
@@ -104,6 +114,16 @@ class Broker:
             f"the broker {self.address} does not let us publish ({code}): allow this user to write "
             f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/# in its access list"
         )
+
+
+def _variable(name: str) -> str | None:
+    """A variable with half of a login; None where it is not set, or empty. Raises BridgeError."""
+    found = os.environ.get(name) or None
+    try:
+        (found or "").encode()
+    except UnicodeEncodeError:  # what it says may be secret
+        raise BridgeError(f"{name}: expected text in UTF-8") from None
+    return found
 
 
 def topic_of(host: str, *parts: str) -> str:

@@ -58,6 +58,7 @@ class Mqtt:
         self._client: Any = None  # of this connection, from the call on; None while there is none
         self._connected = False
         self._wait_s, self._due = FIRST_S, 0.0  # monotonic s: when the broker is called next
+        self._since = 0.0  # monotonic s: when it let us in
         self._waiting: deque[Outgoing] = deque()  # events for the broker, in order
         self._sent: dict[int, Outgoing] = {}  # message's number -> event that it has not acknowledged
         self._changed = False  # what the broker should retain may be something else now
@@ -137,7 +138,7 @@ class Mqtt:
         if code.is_failure:
             self._gone(client, code)
             return
-        self._connected, self._wait_s = True, FIRST_S
+        self._connected, self._since = True, time.monotonic()
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
         if self._gate is not None:
             self._broker.hear(client, topic_of(self._host, "+", *COMMAND))
@@ -151,9 +152,13 @@ class Mqtt:
         """A connection has ended, or could not be."""
         if client is not self._client:
             return
-        self._client, self._connected = None, False
+        let_in, self._client, self._connected = self._connected, None, False
+        soon = let_in and time.monotonic() < self._since + LONGEST_S
+        if let_in and not soon:
+            self._wait_s = FIRST_S
         if not self._stopping:
-            words = f"broker {self._broker.address} is not there: {self._broker.why(error)}; trying again"
+            why = self._broker.why(error, soon=soon)
+            words = f"broker {self._broker.address} is not there: {why}; trying again"
             self._counts.connected("broker", False, words)
             self._due = time.monotonic() + self._wait_s
             self._wait_s = min(2 * self._wait_s, LONGEST_S)

@@ -1,6 +1,7 @@
 """Events at a real broker: what is published, retained and cleared, and what happens when somebody goes."""
 
 import json
+import os
 import queue
 import re
 import shutil
@@ -488,10 +489,32 @@ def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, f
         (["--broker", "localhost", "--ca", "x.pem"], "add --tls"),
         (["--broker", "localhost", "--tls", "--ca", "/none.pem"], "/none.pem"),
         (["--broker", "localhost", "--types", "gestures"], "--types"),
+        (["--broker", "localhost", "--discovery", "home/#"], '--discovery "home/#": expected the beginning of a topic'),
+        (["--broker", "localhost", "--discovery", "+"], '--discovery "+": expected the beginning of a topic'),
+        (["--broker", "localhost", "--discovery", ""], '--discovery "": expected the beginning of a topic'),
     ],
 )
 def test_bad_input_is_one_sentence(refused, tmp_path: Path, flags: list[str], words: str):
     assert words in refused("mqtt", "--socket", tmp_path / "none.sock", *flags)
+
+
+def test_a_login_that_is_no_text_is_refused_and_not_shown(refused, tmp_path: Path, monkeypatch):
+    monkeypatch.setitem(os.environb, b"MQTT_PASSWORD", b"gr\xfcn")
+    said = refused("mqtt", "--broker", "localhost", "--socket", tmp_path / "none.sock")
+    assert "MQTT_PASSWORD: expected text in UTF-8" in said and "gr" not in said.partition("MQTT_PASSWORD")[2]
+
+
+def test_a_broker_that_retains_nothing_is_none_for_the_bridge(bridge, broker, fake):
+    process = begin(bridge, broker("allow_anonymous true", "retain_available false"), fake)
+    assert process.end() == 1 and "it retains nothing" in process.said()
+
+
+def test_two_bridges_of_one_name_are_told_that_there_is_another(bridge, broker, fake):
+    """A broker need not say why it closes the older connection: mosquitto 2.0 does not."""
+    at = broker()
+    first, second = begin(bridge, at, fake), begin(bridge, at, fake)
+    for process in (first, second):
+        process.until("does another bridge have the name gestured-car? (--host)")
 
 
 def test_lines_of_a_mad_daemon_are_passed_over(bridge, broker, listen, fake):

@@ -230,7 +230,6 @@ def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at,
     ],
 )
 def test_what_cannot_be_is_one_sentence(refused, monkeypatch, tmp_path: Path, flags: list[str], words: str) -> None:
-    if flags:
-        monkeypatch.setenv("MQTT_USER", "car")
+    monkeypatch.setenv("MQTT_USER", "car" if flags else "")  # empty: not set
     said = refused("mqtt", "--broker", "localhost", "--socket", tmp_path / "x.sock", "--gates", tmp_path / "g", *flags)
     assert words in said and "Traceback" not in said
