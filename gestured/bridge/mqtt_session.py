@@ -67,8 +67,9 @@ class Mqtt:
         self._farewell = 0  # number of our last word
 
     def stop(self) -> None:
-        """Say good-bye, and let `work` end."""
-        self._inbox.put(partial(setattr, self, "_stopping", True))
+        """Say good-bye, and let `work` end; at once, whatever else waits."""
+        self._stopping = True
+        self._inbox.put(lambda: None)
 
     def hear(self, lines: Iterator[Line]) -> None:
         """Take each line of `follow`; in a thread of its own."""
@@ -192,7 +193,7 @@ class Mqtt:
     def _obey(self, sensor: str) -> None:
         with self._obeying:
             command = self._commands.pop(sensor)
-        if self._gate is None:
+        if self._gate is None or self._stopping:
             return
         try:
             closed = self._gate.obey(sensor, command)

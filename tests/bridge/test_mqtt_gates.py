@@ -177,14 +177,19 @@ def test_an_answer_of_a_mad_daemon_is_a_command_that_failed(tmp_path: Path, answ
             Gate(path, "mqtt", Counts("mqtt")).obey("armrest", OFF)
 
 
-def test_a_command_that_comes_while_another_is_taken_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The broker's thread looks whether one waits, just as the bridge takes that one."""
+def unconnected(monkeypatch: pytest.MonkeyPatch) -> Mqtt:
+    """A bridge with a gate, and with neither a broker nor a daemon."""
     monkeypatch.setenv("MQTT_USER", "car")
     args = Namespace(
         host="car", broker="127.0.0.1", tls=False, ca=None, cert=None, sensors=None, gestures=None, gates=Path("none"),
         gate="mqtt", discovery="homeassistant", no_discovery=True,
     )  # fmt: skip
-    session, obeyed = Mqtt(args, Counts("mqtt")), list[str]()
+    return Mqtt(args, Counts("mqtt"))
+
+
+def test_a_command_that_comes_while_another_is_taken_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The broker's thread looks whether one waits, just as the bridge takes that one."""
+    session, obeyed = unconnected(monkeypatch), list[str]()
 
     class Commands(dict[str, str]):
         def __contains__(self, sensor: object) -> bool:
@@ -209,6 +214,25 @@ def test_a_command_that_comes_while_another_is_taken_is_obeyed(monkeypatch: pyte
     session._hear(Namespace(topic=SET, payload=OFF.encode(), retain=False))
     session._serve(0.0)
     assert obeyed in ([ON, OFF], [OFF, ON, OFF])
+
+
+def test_no_command_that_still_waits_holds_up_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each may take as long as a daemon that hangs is waited for."""
+    session, obeyed = unconnected(monkeypatch), list[str]()
+
+    def obey(sensor: str, command: str) -> list[str]:
+        obeyed.append(sensor)
+        session.stop()  # as a signal does in the middle of it
+        return []
+
+    assert session._gate is not None
+    session._daemon.states = {"armrest": "ok", "console": "ok"}
+    session._gate.obey = obey  # type: ignore[method-assign]
+    for topic in (SET, SET.replace("armrest", "console")):
+        session._hear(Namespace(topic=topic, payload=OFF.encode(), retain=False))
+    session._due = time.monotonic() + 600  # no broker is called
+    session.work()
+    assert obeyed == ["armrest"]
 
 
 def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, house, tmp_path: Path) -> None:
