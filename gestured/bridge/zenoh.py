@@ -8,6 +8,7 @@ gestured/{site}/{sensor}/frames     in: OSC packets as over UDP, with counter an
 """
 
 import argparse
+import os
 from pathlib import Path
 
 from gestured.bridge.counts import Counts
@@ -16,6 +17,8 @@ from gestured.bridge.options import add_destination, add_filters, add_metrics, n
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
 from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
+
+LAST_S = 1.0  # for a router that is just being called, after we were told to end
 
 
 def add(commands: Commands) -> None:
@@ -52,7 +55,12 @@ def run(args: argparse.Namespace) -> int:
         bridge.begin()
         for line in follow(source, counts):
             bridge.take(line)
+    except BaseException:
+        bridge.close()
+        raise
     finally:
         source.close()
-        bridge.close()
+    if not bridge.close(LAST_S):
+        # Its thread would abort the process if it came back to Python while that ends; there is no session to end.
+        os._exit(0)
     return 0

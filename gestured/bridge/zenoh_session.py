@@ -53,15 +53,19 @@ class Zenoh:
             self._publish(line)
         self._hold_tokens()
 
-    def close(self) -> None:
-        """Leave the network: tell it that this session ends."""
+    def close(self, patience_s: float | None = None) -> bool:
+        """Leave the network: tell it that this session ends.
+
+        False where Zenoh still waits for a router that says nothing, after so many seconds; None waits for its end.
+        """
         self._closed.set()
         if self._forward is not None:
             self._forward.close()
         if self._opening.is_alive():
-            self._opening.join()
+            self._opening.join(patience_s if self._session is None else None)
         if self._session is not None:
             self._session.close()
+        return not self._opening.is_alive()
 
     def _open(self) -> None:
         """Open a session: a router that is not there yet is waited for, and later Zenoh connects again by itself."""

@@ -293,6 +293,19 @@ def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
     assert [became(name) for name in ("c", "a", "b")] == ["sent", "sent", "overflow"]
 
 
+def test_a_router_that_says_nothing_holds_up_no_end(bridge, fake, tmp_path):
+    """Zenoh waits for its answer as long as its configuration says, and by nothing can that be ended."""
+    timeouts = {"open_timeout": 3_600_000, "accept_timeout": 3_600_000}
+    (tmp_path / "patient.json5").write_text(json.dumps({"transport": {"unicast": timeouts}}))
+    with socket.create_server(("127.0.0.1", 0)) as router:
+        router.settimeout(DEADLINE_S)
+        to = ("--connect", f"tcp/127.0.0.1:{router.getsockname()[1]}", "--config", tmp_path / "patient.json5")
+        process = bridge("zenoh", *to, "--site", "car", "--socket", fake.path)
+        with router.accept()[0]:
+            assert process.stop() == 0
+            assert "Zenoh cannot be reached" not in process.said()
+
+
 def unconnected() -> Zenoh:
     """What a bridge has of Zenoh, to a router that is not there."""
     parser = argparse.ArgumentParser()
