@@ -18,7 +18,7 @@ from gestured.bridge.zenoh_session import ROUTER, Zenoh
 from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
 
-LAST_S = 1.0  # for a router that is just being called, after we were told to end
+LAST_S = 1.0  # for a router that is just being called, or for our good-bye, after we were told to end
 
 
 def add(commands: Commands) -> None:
@@ -61,6 +61,6 @@ def run(args: argparse.Namespace) -> int:
     finally:
         source.close()
     if not bridge.close(LAST_S):
-        # Its thread would abort the process if it came back to Python while that ends; there is no session to end.
+        # Its thread would abort the process if it came back to Python while that ends. The session ends as we do.
         os._exit(0)
     return 0

@@ -5,6 +5,7 @@ import json
 import re
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -61,11 +62,19 @@ class Zenoh:
         self._closed.set()
         if self._forward is not None:
             self._forward.close()
+        leaving = threading.Thread(target=self._leave, name="leaving", daemon=True)
+        leaving.start()
+        leaving.join(patience_s)
+        return not leaving.is_alive()
+
+    def _leave(self) -> None:
+        import zenoh
+
         if self._opening.is_alive():
-            self._opening.join(patience_s if self._session is None else None)
+            self._opening.join()
         if self._session is not None:
-            self._session.close()
-        return not self._opening.is_alive()
+            with suppress(zenoh.ZError):  # the router hangs
+                self._session.close()
 
     def _open(self) -> None:
         """Open a session: a router that is not there yet is waited for, and later Zenoh connects again by itself."""

@@ -4,7 +4,10 @@ import argparse
 import json
 import queue
 import select
+import signal
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -304,6 +307,32 @@ def test_a_router_that_says_nothing_holds_up_no_end(bridge, fake, tmp_path):
         with router.accept()[0]:
             assert process.stop() == 0
             assert "Zenoh cannot be reached" not in process.said()
+
+
+ROUTER = """
+import sys, time, zenoh
+config = zenoh.Config.from_json5(sys.argv[1])
+with zenoh.open(config):
+    print("there", flush=True)
+    time.sleep(3600)
+"""
+
+
+def test_a_router_that_hangs_holds_up_no_end(bridge, fake):
+    endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
+    config = {"mode": "router", "listen": {"endpoints": [endpoint]}, "scouting": {"multicast": {"enabled": False}}}
+    command = [sys.executable, "-c", ROUTER, json.dumps(config)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as router:
+        try:
+            assert router.stdout is not None and router.stdout.readline()
+            process = bridge("zenoh", "--connect", endpoint, "--site", "car", "--socket", fake.path)
+            fake.accept()
+            process.ready()
+            router.send_signal(signal.SIGSTOP)
+            fake.say(*(gesture(n) for n in range(1, 3000)))  # more than the way to the router holds
+            assert process.stop() == 0, process.said()
+        finally:
+            router.kill()
 
 
 def unconnected() -> Zenoh:
