@@ -50,12 +50,7 @@ def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> It
             temporary.unlink()
         raise
     if durable:
-        with suppress(OSError):  # the changed name; some file systems cannot do that for a folder
-            folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-            try:
-                os.fsync(folder)
-            finally:
-                os.close(folder)
+        _sync_folder(path.parent)
 
 
 def delete_leftovers(path: Path) -> None:
@@ -63,6 +58,16 @@ def delete_leftovers(path: Path) -> None:
     with suppress(OSError):
         for left in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * (2 * NAME_BYTES)}"):
             left.unlink()
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put a changed name onto the disk; some file systems cannot do that for a folder."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def open_regular(path: str | Path) -> BinaryIO:
