@@ -121,8 +121,9 @@ def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> No
     ladder = ladder_for(model)
     usual, odd = (load_settings({"model": str(model), **given}, {})[0] for given in ({}, {"config": str(file)}))
     scene = scene_of(odd, ladder)
-    hub, own = SimpleNamespace(scene=scene), SimpleNamespace(gestures={})
-    told = operations.scene(cast(Parts, SimpleNamespace(ladder=ladder, instance="", hub=hub, own=own, settings=odd)))
+    hub, own, taps = SimpleNamespace(scene=scene), SimpleNamespace(gestures={}), SimpleNamespace(epoch_ns=0)
+    parts = SimpleNamespace(ladder=ladder, instance="", hub=hub, own=own, taps=taps, settings=odd)
+    told = operations.scene(cast(Parts, parts))
     read, other = maker(json.loads(json.dumps(told))).scene, scene_of(usual, ladder)
     kept = {"touches", "frames"}  # what is told beside the answers decides nothing
     for name in {field.name for field in dataclasses.fields(scene)} - kept:
