@@ -117,7 +117,7 @@ class Broker:
 
 
 def _variable(name: str) -> str | None:
-    """A variable with half of a login; None where it is not set, or empty. Raises BridgeError."""
+    """The user or the password from the environment; None where it is not set, or empty. Raises BridgeError."""
     found = os.environ.get(name) or None
     try:
         (found or "").encode()

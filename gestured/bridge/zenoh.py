@@ -18,7 +18,7 @@ from gestured.bridge.zenoh_session import ROUTER, Zenoh
 from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
 
-LAST_S = 1.0  # for a router that is just being called, or for our good-bye, after we were told to end
+LAST_S = 1.0  # that a router may take, once the bridge was told to end: to answer its call, or its good-bye
 
 
 def add(commands: Commands) -> None:

@@ -52,7 +52,7 @@ class Difference(NamedTuple):
         )
 
 
-Verdict = tuple[str, int, list[Difference]]  # how many of what; not compared, since the sensor was unknown; found
+Verdict = tuple[str, int, list[Difference]]  # what was compared, how many were not, and where it differs
 
 
 class Recorded:

@@ -45,7 +45,8 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print until the count is reached, the daemon ends, or Ctrl-C; exit status 2 for what no daemon sends."""
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture, "zones": args.zone}
-    left, early = args.count, dict[str, dict[str, Any]]()  # the latter for `readable`
+    left = args.count
+    early: dict[str, dict[str, Any]] = {}  # by sensor, the provisional event that `readable` compares an answer with
     told = partial(say, to=sys.stderr)
     try:
         with Subscriber(event_path(args), **wanted, reconnect=args.reconnect, say=told) as subscriber:
