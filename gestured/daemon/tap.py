@@ -53,7 +53,7 @@ class Taps:
 
     @property
     def epoch_ns(self) -> int:
-        """From the loop's clock to 1970. While anybody taps it stays, whatever the wall clock does.
+        """Nanoseconds from 1970 to the 0 of the loop's clock. While anybody taps they stay as they are.
 
         So the events of a recording stand where its packets do, even if the machine has slept meanwhile.
         """
