@@ -1,6 +1,7 @@
 """What programs about trained networks begin with: data and networks of `gestured-lab train`, from its cache."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -21,10 +22,10 @@ def options(text: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def loaded(args: argparse.Namespace) -> tuple[TrainingPlan, TrainingData]:
-    """The plan and its data."""
+def loaded(args: argparse.Namespace, **less: int) -> tuple[TrainingPlan, TrainingData]:
+    """The plan and its data; `less` are the plan's numbers of what a program does not need."""
     torch.set_num_threads(args.jobs)
-    plan = TrainingPlan.quick() if args.quick else TrainingPlan()
+    plan = replace(TrainingPlan.quick() if args.quick else TrainingPlan(), **less)
     args.cache.mkdir(parents=True, exist_ok=True)
     return plan, load_data(plan, args.cache, args.real, args.jobs, args.recordings)
 
