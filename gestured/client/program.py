@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, TextIO, TypeAlias
 
 import gestured
@@ -53,15 +54,15 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
 
 
 def on_stop(act: Callable[[], object]) -> None:
-    """Act when SIGTERM or Ctrl-C asks for the end."""
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: act())
+    """Act when SIGTERM, Ctrl-C or a terminal that is closed asks for the end; `nohup` outlives the terminal."""
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: act())
 
 
 def stop_as_by_ctrl_c() -> None:
     """Let SIGTERM, and a terminal that is closed, end this program as Ctrl-C does: what it has started ends, too."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+    on_stop(partial(signal.default_int_handler, signal.SIGINT, None))
 
 
 def _give_up(stream: TextIO) -> None:

@@ -71,7 +71,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
     """Runs gesturectl to its end in this process: exit status, standard output, standard error."""
 
     def finish(*arguments: object, env: Mapping[str, str] = {}) -> tuple[int, str, str]:
-        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
         with TemporaryFile("w+") as out, TemporaryFile("w+") as err, monkeypatch.context() as patch:
             patch.setattr(sys, "stdin", None)
             patch.setattr(sys, "stdout", out)
