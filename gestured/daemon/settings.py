@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from gestured.core.address import Address
 from gestured.core.listening import LONGEST_S, Arming
@@ -28,6 +28,14 @@ class Part(BaseModel):
     """Base of all settings: unknown keys are errors, nothing changes after it was read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _true_is_no_number(cls, value: object, field: ValidationInfo) -> object:
+        kind = cls.model_fields[field.field_name or ""].annotation
+        if isinstance(value, bool) and kind in (int, float, float | None):
+            raise ValueError("a number")
+        return value
 
 
 class ZoneSettings(Part):

@@ -169,6 +169,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ((), {"GESTURED_SOCKETT": "/x"}, "", ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
         ((), {"GESTURED_METRICS_PORT": "9108"}, "", ("GESTURED_METRICS_PORT", "GESTURED_METRICS")),
         ((), {}, "modell = 'x'", ("modell", "did you mean model", "gestured.toml")),
+        ((), {}, "[gestures.one_tap]\nthreshold = true", ("gestures.one_tap.threshold = True", "expected a number")),
         (
             (),
             {},
