@@ -25,6 +25,7 @@ FRAME_MS = 1000 / WINDOW.rate_hz
 WAIT_MS = FRAME_MS + 1000 * Timing().release_s  # a contact is over after so much quiet, which a frame shows
 Name = tuple[float, float, bool, str]  # error, time, whether the model ships, words
 LINE = 15  # pixels of a name
+RAISED = 8  # pixels by which a name stands above its point, so that the stair does not strike it out
 NAMED = 2  # methods beside those that ship, the best ones of a field
 SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}
 CONFUSION = "Which gesture is taken for which"
@@ -131,12 +132,12 @@ def _name(axes: Axes, names: list[Name]) -> None:
     free = -math.inf  # pixels, from which on no name stands
     for error, time, ships, words in sorted(names):
         at = float(axes.transData.transform((time, error))[1])
-        up = max(at, free) - at
+        up = max(at + RAISED, free) - at
         free = at + up + LINE
         arrow = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.6, "shrinkB": 5}
         axes.annotate(
             words, (time, error), (16, up), textcoords="offset points", va="center",
-            fontweight="bold" if ships else "normal", arrowprops=arrow if up else None,
+            fontweight="bold" if ships else "normal", arrowprops=arrow if up > RAISED else None,
         )  # fmt: skip
 
 
