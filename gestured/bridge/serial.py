@@ -99,6 +99,7 @@ class Serial:
                 reason = self._forward(port)
             if reason:
                 self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")
+                time.sleep(AGAIN_S)  # a device that is there and takes nothing would be opened, and reset, at once
 
     def _open(self) -> Any:
         """The device; None where it is to be waited for."""
@@ -149,7 +150,7 @@ class Serial:
                     judged = self._judged(judged + data, began)
                 due = bool(protocol.request) and (bool(readings) or time.monotonic() > asked + ANSWER_S)
         except OSError as error:
-            return error.strerror or "it was unplugged"
+            return error.strerror or ("it takes no request" if "timeout" in str(error) else "it was unplugged")
         return None
 
     def _send(self, readings: list[Reading]) -> None:

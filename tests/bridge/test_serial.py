@@ -1,5 +1,6 @@
 """Sensors on pseudo-terminals: from the simulator through the bridge to the real daemon, and what may go wrong."""
 
+import argparse
 import os
 import pty
 import select
@@ -13,11 +14,16 @@ import tty
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from serial import SerialTimeoutException
 
+from gestured.bridge import serial
+from gestured.bridge.counts import Counts
+from gestured.bridge.serial import AGAIN_S, Serial
 from gestured.core.address import Address
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import Process, page, wait
@@ -198,6 +204,33 @@ def test_a_sensor_that_is_plugged_in_later_is_waited_for(bridge, udp, tmp_path):
 def test_a_sensor_that_does_not_answer_is_asked_again(bridge, line, udp):
     begin(bridge, line, "e256", udp)
     assert line.hear(20) == 2 * b"\xc0/r\0\0,\0\0\0\xc0"
+
+
+def test_a_device_that_takes_no_request_is_given_time_before_it_is_opened_again(monkeypatch, capfd) -> None:
+    opened: list[str] = []
+    slept: list[float] = []
+
+    class Stuck:
+        def __init__(self, device: str, *_: object, **__: object) -> None:
+            opened.append(device)
+            if len(opened) == 3:
+                bridge.stop()
+
+        def __enter__(self) -> "Stuck":
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        def write(self, _: bytes) -> None:
+            raise SerialTimeoutException("Write timeout")
+
+    monkeypatch.setattr("serial.Serial", Stuck)
+    monkeypatch.setattr(serial, "time", SimpleNamespace(monotonic=lambda: 0.0, sleep=slept.append))
+    told = {"device": os.devnull, "baud": None, "grid": None, "to": Address("127.0.0.1", 9), "metrics": None}
+    bridge = Serial(argparse.Namespace(protocol="e256", sensor="skin", **told), Counts("serial"))
+    bridge.work()
+    assert "it takes no request" in capfd.readouterr().err
+    assert slept == [AGAIN_S] * 2  # once between two attempts
 
 
 def test_bytes_of_another_protocol_are_recognised(bridge, line, udp):
