@@ -2,7 +2,7 @@
 
     python -m experiments.seeds --document models/cnn_lstm.md
 
-A further seed takes some 25 minutes of one core, and goes on where it was interrupted. The first seed is the one that
+A further seed takes some 20 minutes of one core, and goes on where it was interrupted. The first seed is the one that
 ships: its network is taken from the cache of its training, in which two other networks were learned beside it. A
 further seed's network is learned alone. All are judged before calibration, second opinion and real fingers: a gesture
 is right where its score is the best among gestures; a non-gesture is rejected where the best of all scores is of none.
