@@ -189,15 +189,18 @@ def test_a_tap_that_nobody_reads_loses_packets_is_told_and_holds_nobody_up(start
         with socket.socket(type=socket.SOCK_DGRAM) as sender:
             sender.connect(daemon.address)
             with daemon.control() as other:
-                for _ in range(10):  # 12 MiB in all: more than is kept for a reader that sleeps
+                taken = 0  # the kernel drops some where the daemon has to wait for its core
+                while taken < 300:  # 12 MiB in all: more than is kept for a reader that sleeps
                     for _ in range(30):
                         sender.send(packet)
-                    assert other.ask("status")["taps"] == 1
+                    status = other.ask("status")
+                    assert status["taps"] == 1
+                    taken = sum(status["input"]["dropped"].values())
         client = daemon.client()
         Sensor(daemon, "arm").begin().perform("left")
         assert client.events("gesture", "arm")
         lost = next(line["count"] for line in control.lines() if line["type"] == "lost")
-        assert 0 < lost < 400
+        assert 0 < lost < taken + 100
 
 
 def test_a_sensor_of_the_file_that_was_never_heard_has_no_data(start, tmp_path: Path) -> None:
