@@ -213,12 +213,17 @@ def recorded(start, daemon: Daemon, tmp_path: Path):
 
 
 def gestures(daemon: Daemon, name: str, *directions: str):
-    """Performs them, and waits for what the daemon makes of them."""
+    """Performs them, and waits for what the daemon makes of them, and until it has taken all packets."""
 
     def perform() -> None:
         client = daemon.client().subscribe("release", sensors=[name])
-        Sensor(daemon, name).begin().perform(*directions)
-        client.events("release", name, len(directions))
+        with daemon.control() as tap:
+            tap.ask("tap")
+            sensor = Sensor(daemon, name).begin().perform(*directions)
+            client.events("release", name, len(directions))
+            packets = (line for line in tap.lines() if line["type"] == "packet")
+            for _ in range(sensor.count):
+                next(packets)
 
     return perform
 
