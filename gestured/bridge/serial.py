@@ -88,18 +88,16 @@ class Serial:
     def work(self) -> None:
         """Forward, and wait for the device where it went. Raises BridgeError where waiting does not help."""
         while not self._stopped:
-            port = self._open()
-            if port is None:
-                time.sleep(AGAIN_S)
-                continue
-            with port:
-                self._opened = True
-                self._counts.connected("device", True, f"{self._device} is open")
-                self._counts.ready(device=self._device, sensor=self._sensor, to=str(self._to))
-                reason = self._forward(port)
-            if reason:
-                self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")
-                time.sleep(AGAIN_S)  # a device that is there and takes nothing would be opened, and reset, at once
+            if (port := self._open()) is not None:
+                with port:
+                    self._opened = True
+                    self._counts.connected("device", True, f"{self._device} is open")
+                    self._counts.ready(device=self._device, sensor=self._sensor, to=str(self._to))
+                    reason = self._forward(port)
+                if reason:
+                    self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")
+            if not self._stopped:
+                time.sleep(AGAIN_S)  # also before a device that is still there: being opened resets many boards
 
     def _open(self) -> Any:
         """The device; None where it is to be waited for."""
@@ -127,6 +125,8 @@ class Serial:
 
     def _forward(self, port: Any) -> str | None:
         """Forward what one connection brings; why it ended, None where it was we who ended it."""
+        from serial import SerialTimeoutException
+
         protocol = self._protocol(self._rows, self._columns)
         judged: bytes | None = b""  # what came before the first frame; None once that is told
         asked = began = time.monotonic()
@@ -149,8 +149,10 @@ class Serial:
                 elif judged is not None:
                     judged = self._judged(judged + data, began)
                 due = bool(protocol.request) and (bool(readings) or time.monotonic() > asked + ANSWER_S)
+        except SerialTimeoutException:
+            return "it takes no request"
         except OSError as error:
-            return error.strerror or ("it takes no request" if "timeout" in str(error) else "it was unplugged")
+            return error.strerror or "it was unplugged"
         return None
 
     def _send(self, readings: list[Reading]) -> None:
