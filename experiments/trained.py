@@ -23,7 +23,7 @@ def options(text: str | None) -> argparse.ArgumentParser:
 
 
 def loaded(args: argparse.Namespace, **less: int) -> tuple[TrainingPlan, TrainingData]:
-    """The plan and its data; `less` are the plan's numbers of what a program does not need."""
+    """The plan and its data. `less` has other numbers for what a program does not read, such as `days_points=1`."""
     torch.set_num_threads(args.jobs)
     plan = replace(TrainingPlan.quick() if args.quick else TrainingPlan(), **less)
     args.cache.mkdir(parents=True, exist_ok=True)
