@@ -54,10 +54,12 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
 
 
 def on_stop(act: Callable[[], object]) -> None:
-    """Act when SIGTERM, Ctrl-C or a terminal that is closed asks for the end; `nohup` outlives the terminal."""
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, lambda *_: act())
+    """Act when SIGTERM, Ctrl-C or a closed terminal asks for the end."""
+    asks = [signal.SIGTERM, signal.SIGINT]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # `nohup` has it ignored: its program needs no terminal
+        asks.append(signal.SIGHUP)
+    for number in asks:
+        signal.signal(number, lambda *_: act())
 
 
 def stop_as_by_ctrl_c() -> None:

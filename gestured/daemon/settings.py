@@ -32,6 +32,7 @@ class Part(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _true_is_no_number(cls, value: object, field: ValidationInfo) -> object:
+        """ValueError for true and false where a number is expected: pydantic takes them for 1 and 0."""
         kind = cls.model_fields[field.field_name or ""].annotation
         if isinstance(value, bool) and kind in (int, float, float | None):
             raise ValueError("a number")

@@ -213,7 +213,7 @@ def recorded(start, daemon: Daemon, tmp_path: Path):
 
 
 def gestures(daemon: Daemon, name: str, *directions: str):
-    """Performs them, and waits for what the daemon makes of them, and until it has taken all packets."""
+    """Performs them, and waits until the daemon has read all packets, and has said what it makes of them."""
 
     def perform() -> None:
         client = daemon.client().subscribe("release", sensors=[name])

@@ -1,10 +1,12 @@
 """gesturectl as a whole: each subcommand is there, and one does not load what only others need."""
 
+import signal
 import subprocess
 import sys
 
 import pytest
 
+from gestured.client.program import on_stop, stop_as_by_ctrl_c
 from gestured.control.cli import SUBCOMMANDS, parser
 from tests.daemon.harness import Daemon
 
@@ -85,3 +87,16 @@ def test_who_looks_whether_a_terminal_is_there_finds_none_where_the_output_is_cl
 
 def test_an_error_that_cannot_be_said_changes_no_exit_status() -> None:
     assert redirected("2>/dev/full", "status", "--control", "/nowhere.ctl") == (1, "")
+
+
+@pytest.mark.parametrize("handle", [stop_as_by_ctrl_c, lambda: on_stop(print)])
+def test_what_nohup_started_outlives_its_terminal(handle) -> None:
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
+    try:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup leaves it
+        handle()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGTERM) is not before[signal.SIGTERM]
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

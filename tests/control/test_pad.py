@@ -339,8 +339,8 @@ def test_a_telephone_draws_a_swipe_a_double_tap_and_two_fingers_and_a_mouse_a_ci
     for gesture in ("swipe_right", "double_tap", "swipe_up_two_fingers"):
         hand.perform(gesture)
     place = hand.box()
-    browser.run("name({ type: 'onset' })")  # one line of words where several stood
-    assert hand.box() == place  # the pad does not move under the finger
+    browser.run("name({ type: 'onset' })")  # the last gesture's name took two lines; what a touch begins with takes one
+    assert hand.box() == place, "the pad moved under the finger"
     for _ in range(4):  # a circle that a mouse draws has its name before the button is let go
         hand.mouse(circle(1), 1.2)
         named = browser.until(SHOWN)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.client.program import on_stop, stop_as_by_ctrl_c
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
@@ -84,19 +83,6 @@ def test_a_recording_is_whole_whatever_asks_for_its_end(recorded, stop: int) -> 
     path, said = recorded(lambda: None, stop=stop)
     assert json.loads(said)["ended"] == "as asked"
     assert tape_reader.read(path).whole
-
-
-@pytest.mark.parametrize("handle", [stop_as_by_ctrl_c, lambda: on_stop(print)])
-def test_what_nohup_started_outlives_its_terminal(handle) -> None:
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
-    try:
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup leaves it
-        handle()
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-        assert signal.getsignal(signal.SIGTERM) is not before[signal.SIGTERM]
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path: Path) -> None:

@@ -189,8 +189,8 @@ def test_a_tap_that_nobody_reads_loses_packets_is_told_and_holds_nobody_up(start
         with socket.socket(type=socket.SOCK_DGRAM) as sender:
             sender.connect(daemon.address)
             with daemon.control() as other:
-                taken = 0  # the kernel drops some where the daemon has to wait for its core
-                while taken < 300:  # 12 MiB in all: more than is kept for a reader that sleeps
+                taken = 0  # packets that the daemon has read: on a busy machine the kernel drops some before
+                while taken < 300:  # as lines 12 MiB, more than the daemon keeps for a tap that does not read
                     for _ in range(30):
                         sender.send(packet)
                     status = other.ask("status")
