@@ -38,6 +38,16 @@ def shallow() -> Iterator[Path]:
         yield Path(name)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _hangup() -> None:
+    """Programs that are started here take SIGHUP as usual, also where `nohup` started the tests.
+
+    A program inherits that a signal is ignored, but not that it is handled.
+    """
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: None)
+
+
 @pytest.fixture
 def start() -> Iterator[Start]:
     """Starts gesturectl with these arguments; whatever still runs at the end of the test is ended."""
