@@ -3,10 +3,14 @@
 import argparse
 import os
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from gestured.client.address import find_control, find_socket, setting
 from gestured.client.control import Control
+
+LAST_S = 3.0  # for the last lines of a daemon that is to say no more
 
 
 def add_sockets(parser: argparse.ArgumentParser) -> None:
@@ -38,9 +42,19 @@ def event_path(args: argparse.Namespace) -> Path:
             return Path(status["addresses"]["socket"])
 
 
+def finish(control: Control) -> None:
+    """Let `control.lines()` end: with what the daemon has said by now, or after LAST_S, since it may hang."""
+    control.finish()
+    _later(LAST_S, control.close)
+
+
 def finish_after(control: Control, seconds: float) -> None:
     """Let `control.lines()` end after so long."""
-    timer = threading.Timer(seconds, control.finish)
+    _later(seconds, partial(finish, control))
+
+
+def _later(seconds: float, act: Callable[[], object]) -> None:
+    timer = threading.Timer(seconds, act)
     timer.daemon = True
     timer.start()
 
