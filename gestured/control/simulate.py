@@ -8,7 +8,7 @@ from typing import Any
 from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
-from gestured.client.values import host_port, sensor_name
+from gestured.client.values import host_port, number, sensor_name
 from gestured.control.play import add_arguments, everyday, frames, takes
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -34,7 +34,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--sensor", type=sensor_name, default="simulated", metavar="NAME", help="its name (default: simulated)"
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: go on)")
+    parser.add_argument("--seconds", type=number(0.001, 1e9), metavar="S", help="end after so long (default: go on)")
     parser.add_argument(
         "--everyday",
         nargs="?",
