@@ -1,16 +1,15 @@
 """What a recording's events and those of its replay have in common, and where they differ."""
 
 from collections.abc import Callable, Iterable, Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from gestured.client.say import shown
+from gestured.control.show import clock
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
 CONFIDENCE_TOLERANCE = 0.05  # what a baseline learned at another moment may change
-STOPWATCH_S = 1e6  # times below are no dates
 
 Line = Mapping[str, Any]  # of the event stream; its times are the recording's
 Knew = Callable[[str, float], bool]  # whether a sensor's idle state was known at a time (s)
@@ -26,11 +25,8 @@ class Answer(NamedTuple):
 
     def words(self) -> str:
         """The answer as a line that a person reads."""
-        clock = f"{self.onset:.3f} s"
-        if self.onset >= STOPWATCH_S:
-            clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]
         sure = "" if self.confidence is None else f" {self.confidence:.3f}"
-        return f"{clock} {self.sensor}: {self.answer}{sure}"
+        return f"{clock(self.onset)} {self.sensor}: {self.answer}{sure}"
 
 
 class Difference(NamedTuple):

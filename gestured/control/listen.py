@@ -13,7 +13,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number, some_of
 from gestured.control.address import add_sockets, event_path
-from gestured.control.show import said_when
+from gestured.control.show import clock, said_when
 from gestured.control.status import listens
 from gestured.core.messages import EVENT_TYPES
 
@@ -73,8 +73,7 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
     moment = next((event[key] for key in TIMES if event.get(key) is not None), time.time())
-    clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
-    head = f"{clock}  {sensor:<12} "
+    head = f"{clock(moment):<12}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])

@@ -89,6 +89,7 @@ def test_labels_are_compared_with_what_a_model_says_of_their_recordings(replay, 
     assert [line.split()[1:5] for line in out.splitlines()][:2] == [["101.600", "s", "recording", "1:"]] * 2
     status, out, _ = replay(wrongly, "--model", model, "--diff", "--json")
     assert [json.loads(line)["recorded"]["sensor"] for line in out.splitlines()] == ["recording 1", "recording 2"]
+    assert replay(wrongly, "--model", model)[1].startswith("1.600 s       recording    onset")
     status, out, _ = replay(wrongly, "--model", model, "--sensor", "arm", "--json")
     events = [json.loads(line) for line in out.splitlines()]
     assert {event["sensor"] for event in events} == {"arm"}
