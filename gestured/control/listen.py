@@ -54,11 +54,11 @@ def run(args: argparse.Namespace) -> int:
                 kind = event.get("type")
                 if args.json:
                     _repeat(line, event)
-                elif kind != "hello":
+                elif kind == "hello":
+                    told(_greeting(event))
+                else:
                     say(readable(event, early))
-                if kind == "hello":
-                    _greet(event, args)
-                elif left is not None and kind != "lost":
+                if left is not None and kind not in ("hello", "lost"):
                     left -= 1
                     if left <= 0:
                         return 0
@@ -116,15 +116,10 @@ def went(where: dict[str, Any]) -> str:
     return f"from {start}{zone} to {end}" if where["way"] else f"at {start}{zone}"
 
 
-def _greet(hello: dict[str, Any], args: argparse.Namespace) -> None:
-    """Say whom it listens to, and which gestures that daemon will never send."""
-    known = ", ".join(hello["gestures"])
-    if not args.json:
-        names = ", ".join(hello["sensors"]) or "none yet"
-        say(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", to=sys.stderr)
-    for name in args.gesture or ():
-        if name not in hello["gestures"]:
-            say(f"no gesture of this daemon: {name} ({known})", to=sys.stderr)
+def _greeting(hello: dict[str, Any]) -> str:
+    """Whom it listens to."""
+    names = ", ".join(hello["sensors"]) or "none yet"
+    return f"gestured {hello['version']}, model {hello['model']}, sensors: {names}"
 
 
 def _repeat(line: str, event: dict[str, Any]) -> None:
