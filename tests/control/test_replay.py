@@ -3,12 +3,12 @@
 import json
 import signal
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gestured.control.cli import main
 from gestured.record import arrays as recording
 from gestured.record import tape_reader
 from gestured.record.recordings import Recordings
@@ -22,14 +22,9 @@ LEAD_S = 1.6  # untouched; 24 frames
 
 
 @pytest.fixture
-def replay(capsys: pytest.CaptureFixture[str]):
+def replay(run):
     """`gesturectl replay`: exit status, standard output, standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        return main(["replay", *map(str, arguments)]), *capsys.readouterr()
-
-    return run
+    return partial(run, "replay")
 
 
 def said(out: str) -> list[str]:
