@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gestured.client import address
-from gestured.control.cli import main
 from gestured.control.doctor import _buffer, _clock, _permissions, _port
 from gestured.control.findings import BUFFER_BYTES
 from gestured.control.status import screen
@@ -69,7 +68,7 @@ def test_status_says_one_thing_of_the_shift(shares: dict[str, float], unlike: li
 
 
 def test_without_a_daemon_each_says_so_in_one_line(run, tmp_path: Path) -> None:
-    for command in (["status"], ["listen"], ["emit", "one_tap"], ["reload"], ["record", tmp_path / "x.mcap"]):
+    for command in (["status"], ["listen"], ["emit", "one_tap"], ["view"], ["record", tmp_path / "x.mcap"]):
         status, out, err = run(*command, "--control", tmp_path / "none.ctl")
         assert status == 1 and out == "" and err.count("\n") == 1
         assert "no daemon on" in err and "--control" in err
@@ -184,15 +183,18 @@ def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -
     assert "ROWSxCOLUMNS" not in out
 
 
-def test_a_socket_that_is_not_for_us_names_the_remedy(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_socket_that_is_not_for_us_names_the_remedy(run, monkeypatch: pytest.MonkeyPatch) -> None:
     def connect(self: socket.socket, path: str) -> None:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(socket.socket, "connect", connect)
-    for command in (["status"], ["listen"], ["doctor"]):
-        assert main(command) == 1
-        out, err = capsys.readouterr()
-        assert "Permission denied" in out + err and 'usermod -aG gestured,gestured-events "$USER"' in out + err
+    for command in ("status", "listen", "doctor"):
+        status, out, err = run(command)
+        assert (
+            status == 1
+            and "Permission denied" in out + err
+            and 'usermod -aG gestured,gestured-events "$USER"' in out + err
+        )
 
 
 def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
