@@ -2,6 +2,7 @@
 
 import argparse
 from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
 
 from gestured.client.control import Control
@@ -43,8 +44,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def flag_path(folder: Path) -> Path:
-    """A name for what is flagged now."""
-    return folder / f"flag-{datetime.now():%Y%m%d-%H%M%S}.mcap"
+    """A name for what is flagged now, which no file has."""
+    stem = f"flag-{datetime.now():%Y%m%d-%H%M%S}"
+    names = chain([stem], (f"{stem}-{n}" for n in count(2)))
+    return next(path for name in names if not (path := folder / f"{name}.mcap").exists())
 
 
 def flag(control: Control, path: Path, note: str) -> Keeper:

@@ -75,7 +75,8 @@ def test_a_swipe_is_drawn_named_and_flagged(sensor: Sensor, browser: Browser, tm
         f"{rows}.find(row => row.cells[0].textContent === {sensor.name!r})?.cells[6].textContent === '1'"
     )  # this hour
     assert browser.run("document.documentElement.scrollWidth <= innerWidth")  # nothing sticks out
-    browser.run("document.getElementById('note').value = 'a test'; document.getElementById('flag').click()")
+    browser.run("at('note').value = 'a test'; at('flag').click()")
+    browser.run("at('flag').dispatchEvent(new MouseEvent('click', { detail: 2 }))")  # the second one of a double click
     said = browser.until("document.getElementById('done').textContent.includes('.mcap') && done.textContent")
     (kept,) = tmp_path.glob("flag-*.mcap")
     assert str(kept) in said
