@@ -23,7 +23,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number
-from gestured.control.play import add_arguments, frames, takes
+from gestured.control.play import add_arguments, frames, performance
 from gestured.control.show import Felt, Screen, as_dict, block, in_colour, in_words
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -57,7 +57,7 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
     stop_as_by_ctrl_c()
-    ((_, take),) = takes(args, args.seconds, first="circle_clockwise")
+    take = performance(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
     with Engine(args.model, rows, columns, "--flight-recorder", "4") as engine:  # the page can flag

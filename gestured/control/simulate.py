@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from gestured.client.lines import read_ahead
 from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
@@ -57,8 +58,9 @@ def run(args: argparse.Namespace) -> int:
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
+    parts = (everyday if args.everyday else takes)(args, args.seconds)
     try:
-        for start, take in (everyday if args.everyday else takes)(args, args.seconds):
+        for start, take in iter(read_ahead(parts, 1).get, None):  # the next one is made meanwhile
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()

@@ -18,7 +18,7 @@ from gestured.client.engine import Engine
 from gestured.client.sensor import Form
 from gestured.control.cli import parser
 from gestured.control.demo import sending
-from gestured.control.play import takes
+from gestured.control.play import performance
 from gestured.model.shipped import shipped
 from tests.control.pages import Page
 from tests.sockets import PATIENCE_S
@@ -98,8 +98,7 @@ def test_ended_amid_a_packet_it_sends_that_packet_first(monkeypatch, udp) -> Non
 
     monkeypatch.setattr(Form, "packet", slowly)
     args = parser(["demo"]).parse_args(["demo"])
-    ((_, take),) = takes(args, 5.0)
-    with sending(udp.getsockname(), take):
+    with sending(udp.getsockname(), performance(args, 5.0)):
         assert amid.wait(PATIENCE_S)
     assert b"/demo/pressure" in udp.recv(65536)
 
