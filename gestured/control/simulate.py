@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 from gestured.client.lines import read_ahead
@@ -54,13 +55,14 @@ def run(args: argparse.Namespace) -> int:
     """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
     if args.everyday and (args.kinds or args.speed):
         raise GesturedError("--everyday: expected neither --kinds nor --speed, a day has its own")
-    sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
-    parts = (everyday if args.everyday else takes)(args, args.seconds)
+    parts = iter(read_ahead((everyday if args.everyday else takes)(args, args.seconds), 1).get, None)
+    first = next(parts)  # the sensor's time begins once it is made; each further one is made while one is sent
+    sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     try:
-        for start, take in iter(read_ahead(parts, 1).get, None):  # the next one is made meanwhile
+        for start, take in chain([first], parts):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()

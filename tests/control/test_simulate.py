@@ -145,9 +145,13 @@ def test_what_is_made_at_a_time_is_bounded_and_made_before_it_is_to_be_sent(run,
             while len(made) < 3 and time.monotonic() < end:  # this one, the next, and one that waits for its place
                 time.sleep(0.01)
 
+    def begins(*arguments):
+        assert made
+        return Slow(*arguments)
+
     monkeypatch.setattr("gestured.control.play.PART_COUNTS", 50_000)
     monkeypatch.setattr("gestured.control.simulate.takes", parts)
-    monkeypatch.setattr("gestured.control.simulate.Sensor", Slow)
+    monkeypatch.setattr("gestured.control.simulate.Sensor", begins)
     assert run("simulate", "--seconds", 120, "--kinds", "one_tap")[0] == 0
     assert len(made) == 3 and max(made) <= 50_000
 
