@@ -1,6 +1,8 @@
 """What a recording's events and those of its replay have in common, and where they differ."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -85,10 +87,13 @@ def answers(lines: Iterable[Line]) -> list[Answer]:
 
 def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Difference]:
     """Contacts are matched by their onsets; what is alike on both sides is left out."""
-    rest = sorted(after, key=lambda answer: answer.onset)
+    by_onset = attrgetter("onset")
+    rest = sorted(after, key=by_onset)
     found = []
-    for old in sorted(before, key=lambda answer: answer.onset):
-        near = [new for new in rest if new.sensor == old.sensor and abs(new.onset - old.onset) <= ONSET_S]
+    for old in sorted(before, key=by_onset):
+        first = bisect_left(rest, old.onset - ONSET_S, key=by_onset)
+        last = bisect_right(rest, old.onset + ONSET_S, key=by_onset)
+        near = [new for new in rest[first:last] if new.sensor == old.sensor]
         new = min(near, key=lambda answer: abs(answer.onset - old.onset), default=None)
         if new is not None:
             rest.remove(new)
