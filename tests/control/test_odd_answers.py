@@ -15,12 +15,6 @@ EMPTY = {"ok": True}
 WRONG = {"ok": True, "ready": 1, "sensors": [], "addresses": 3, "own": [], "epoch_ns": "soon"}
 
 
-@pytest.fixture
-def fake(shallow: Path) -> FakeDaemon:
-    """A control socket that says exactly what it is told to."""
-    return FakeDaemon(shallow / "events.ctl")
-
-
 @pytest.mark.parametrize("answer", [EMPTY, WRONG], ids=["empty", "wrong"])
 @pytest.mark.parametrize(
     "command",
@@ -58,8 +52,7 @@ def test_a_tap_without_what_is_kept_ends_the_recording(
 @pytest.mark.parametrize("command", ["record", "record --seconds 0.2", "sniff", "sniff --seconds 0.2"])
 def test_what_a_daemon_that_hangs_streams_can_be_ended(run, daemon, fake, monkeypatch, command: str) -> None:
     monkeypatch.setattr("gestured.control.address.LAST_S", 0.1)
-    with daemon.control() as control:
-        scene = control.ask("tap")
+    scene = daemon.ask("tap")
 
     def hang() -> None:
         fake.accept(scene)

@@ -246,8 +246,7 @@ def test_a_real_daemon_that_is_started_again(tmp_path: Path):
             daemon = Daemon.start(tmp_path, model)
             try:
                 assert next(subscriber)["type"] == "status"
-                with Control(Path(daemon.ready["control"])) as control:
-                    control.ask("emit", gesture="swipe_left", sensor="armrest")
+                daemon.ask("emit", gesture="swipe_left", sensor="armrest")
                 gesture = next(event for event in subscriber if event["type"] == "gesture")
                 assert (gesture["gesture"], gesture["sequence"]) == ("swipe_left", 1)
                 instances.append(subscriber.hello["instance"])

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.client.control import Control
 from gestured.control.view.server import PAGE
 from gestured.core.where import zones_of
 from gestured.record.tape_reader import read
@@ -341,8 +340,7 @@ def test_a_switch_silences_a_sensor_after_a_question(sensor: Sensor, real: Daemo
         says(word, not answer)
     perform(sensor, browser, "left")
     browser.until("document.getElementById('name-note').textContent.startsWith('inhibited view,')")
-    with Control(Path(real.ready["control"])) as control:
-        control.ask("inhibit", sensor=sensor.name, gate="door")
+    real.ask("inhibit", sensor=sensor.name, gate="door")
     says("silent, gates closed: door, view", False)
     browser.run("document.getElementById('gate').click()")
     says("silent, gates closed: door", True)
@@ -402,8 +400,7 @@ def test_the_longest_names_stick_out_of_no_telephone(serve, tmp_path: Path, brow
     with viewing(daemon.ready["control"]) as page:
         sensor = follow(page, browser, name, daemon)
         browser.size(400, 900)
-        with daemon.control() as control:
-            control.ask("inhibit", sensor=name, gate=gate)
+        daemon.ask("inhibit", sensor=name, gate=gate)
         perform(sensor, browser, "left")
         browser.until(f"document.getElementById('name-note').textContent.includes('{gate}')")
         browser.until(f"document.getElementById('listens').textContent.includes('{gate}')")
