@@ -50,7 +50,8 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: lis
         ("sniff", "--listen", f"{'a' * 64}:9000"), ("pad", "--listen", ".:9000"), ("simulate", "--sensor", "a/b"),
         ("simulate", "--kinds", "semaphore"), ("simulate", "--seed", "-1"), ("simulate", "--rate", "4"),
         ("simulate", "--rate", "nan"), ("simulate", "--blob", "int12"), ("simulate", "--everyday", "moon"),
-        ("sniff", "--seconds", "0"), ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
+        ("sniff", "--seconds", "0"), ("status", "--socket", ""), ("status", "--control", "/"),
+        ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
     ],
 )  # fmt: skip
 def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: str, value: str) -> None:
