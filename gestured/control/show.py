@@ -154,7 +154,7 @@ class Felt:
         """The picture with its words."""
         head = shown(f"{view['sensor']}  {view['state']}")
         if view["values"] is None:
-            return [head, "the idle sensor is being learned: leave it untouched for a second"]
+            return [head, "the idle sensor is being learned:", "leave it untouched for a second"]
         values = np.array(view["values"], np.float32).reshape(view["grid"])
         self._full = max(self._full, float(values.max()), NOISE * view["noise"])
         words = ["", head, f"phase     {view['phase'].lower()}", f"activity  {view['activity']:.1f}", ""]
