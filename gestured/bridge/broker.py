@@ -149,7 +149,7 @@ def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:
             raise BridgeError("--ca and --cert are for encrypted connections: add --tls")
         return None
     for flag, path in (("--ca", args.ca), ("--cert", args.cert)):
-        if path is not None and not os.access(path, os.R_OK):
+        if path is not None and (path.is_dir() or not os.access(path, os.R_OK)):
             raise BridgeError(f"{flag} {path}: there is no such file that we may read")
     try:
         context = ssl.create_default_context(cafile=args.ca)

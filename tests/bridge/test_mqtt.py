@@ -488,6 +488,7 @@ def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, f
         (["--broker", "a b"], "expected HOST:PORT"),
         (["--broker", "localhost", "--ca", "x.pem"], "add --tls"),
         (["--broker", "localhost", "--tls", "--ca", "/none.pem"], "/none.pem"),
+        (["--broker", "localhost", "--tls", "--ca", "/etc/ssl/certs"], "--ca /etc/ssl/certs: there is no such file"),
         (["--broker", "localhost", "--types", "gestures"], "--types"),
         (["--broker", "localhost", "--discovery", "home/#"], '--discovery "home/#": expected the beginning of a topic'),
         (["--broker", "localhost", "--discovery", "+"], '--discovery "+": expected the beginning of a topic'),
