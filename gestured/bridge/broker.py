@@ -108,12 +108,18 @@ class Broker:
 
         client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
 
-    def refusal(self, code: object) -> BridgeError:
+    def unwritable(self, code: object) -> BridgeError:
         """What is to be said where the broker does not take what we publish."""
-        return BridgeError(
-            f"the broker {self.address} does not let us publish ({code}): allow this user to write "
-            f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/# in its access list"
-        )
+        topics = f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/#"
+        return self._unallowed(f"publish ({code})", f"write {topics}")
+
+    def unreadable(self, code: object, topic: str) -> BridgeError:
+        """What is to be said where the broker does not let us hear commands."""
+        return self._unallowed(f"hear commands ({code})", f"read {topic}")
+
+    def _unallowed(self, what: str, right: str) -> BridgeError:
+        said = f"the broker {self.address} does not let us {what}"
+        return BridgeError(f"{said}: allow this user to {right} in its access list")
 
 
 def _variable(name: str) -> str | None:

@@ -4,6 +4,7 @@ import json
 import os
 import queue
 import re
+import select
 import shutil
 import signal
 import socket
@@ -344,6 +345,41 @@ def test_a_broker_is_told_to_send_no_large_message(bridge, fake):
         bridge("mqtt", "--broker", f"127.0.0.1:{server.getsockname()[1]}", "--socket", fake.path)
         with server.accept()[0] as connection:
             assert b"\x27" + (65536).to_bytes(4, "big") in connection.recv(65536)  # Maximum Packet Size (3.1.2.11.4)
+
+
+def published(data: bytes) -> Iterator[tuple[bytes, str]]:
+    """Number and topic of each message that a client has published, with QoS 1."""
+    while data:
+        length, size, shift = 0, 1, 0
+        while True:  # 1.5.5, seven bits a byte
+            length, shift = length | (data[size] & 127) << shift, shift + 7
+            size += 1
+            if data[size - 1] < 128:
+                break
+        packet, data = data[size : size + length], data[size + length :]
+        end = 2 + int.from_bytes(packet[:2], "big")
+        yield packet[end : end + 2], packet[2:end].decode()
+
+
+def test_a_broker_gets_no_more_messages_at_a_time_than_it_asks_for(bridge, fake):
+    """It may end the connection of who sends more (Receive Maximum, 3.2.2.3.3)."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        bridge("mqtt", "--broker", f"127.0.0.1:{server.getsockname()[1]}", "--socket", fake.path)
+        with server.accept()[0] as connection:
+            connection.settimeout(DEADLINE_S)
+            assert connection.recv(65536).startswith(b"\x10")  # CONNECT
+            connection.sendall(b"\x20\x06\x00\x00\x03\x21\x00\x03")  # CONNACK: three
+            fake.accept()
+            events, waiting = 0, list[bytes]()
+            while events < 20:
+                fake.say(STATUS, *(gesture(n) for n in range(10)))
+                while select.select([connection], [], [], 0.05)[0]:
+                    for number, topic in published(connection.recv(65536)):
+                        waiting.append(number)
+                        events += topic.endswith("/armrest/gesture")
+                assert len(waiting) <= 3
+                connection.sendall(b"\x40\x02" + waiting.pop(0))  # PUBACK
 
 
 def test_a_broker_that_sends_what_cannot_be_read_is_called_again(bridge, fake):

@@ -1,7 +1,9 @@
 """A gate that a real broker closes and opens, of a real daemon, through the bridge."""
 
 import json
+import shutil
 import socket
+import subprocess
 import threading
 import time
 from argparse import Namespace
@@ -233,6 +235,26 @@ def test_no_command_that_still_waits_holds_up_the_end(monkeypatch: pytest.Monkey
     session._due = time.monotonic() + 600  # no broker is called
     session.work()
     assert obeyed == ["armrest"]
+
+
+def test_a_broker_that_lets_nobody_hear_commands_is_none_for_gates(bridge, broker, gated, tmp_path: Path) -> None:
+    """As mosquitto's own plugin refuses it; a switch that did nothing would stand in Home Assistant."""
+    plugin = next(Path("/usr/lib").glob("*/mosquitto_dynamic_security.so"), None)
+    if plugin is None or shutil.which("mosquitto_ctrl") is None:
+        pytest.skip("mosquitto and its plugin are not installed (apt-get install mosquitto)")
+    file = tmp_path / "security.json"
+    subprocess.run(["mosquitto_ctrl", "dynsec", "init", file, "car"], input=2 * "secret\n", text=True, check=True)
+    known = json.loads(file.read_text())
+    known["roles"][0]["acls"] = [{"acltype": "publishClientSend", "topic": "#", "allow": True}]
+    file.write_text(json.dumps(known))
+    at = broker("allow_anonymous false", f"plugin {plugin}", f"plugin_opt_config_file {file}", "user root")
+    process = bridge(
+        "mqtt", "--broker", at.address, "--host", "car", "--socket", gated.socket, "--gates", gated.ready["gates"],
+        env={"MQTT_USER": "car", "MQTT_PASSWORD": "secret"},
+    )  # fmt: skip
+    assert process.end() == 1
+    said = process.said()
+    assert "does not let us hear commands" in said and "allow this user to read gestured/car/+/gate/set" in said
 
 
 def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, house, tmp_path: Path) -> None:
