@@ -47,14 +47,15 @@ MAD = (  # what no daemon says
 
 
 class Listener:
-    """A subscriber of its own make, with MQTT 5."""
+    """A client of its own make, with MQTT 5."""
 
-    def __init__(self, port: int, *topics: str) -> None:
+    def __init__(self, port: int, *topics: str, login: tuple[str | None, str | None] = (None, None)) -> None:
         self._messages: queue.Queue[Any] = queue.Queue()
         subscribed: queue.Queue[bool] = queue.Queue()
         self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
         self.client.on_message = lambda _, __, message: self._messages.put(message)
         self.client.on_subscribe = lambda *_: subscribed.put(True)
+        self.client.username_pw_set(*login)
         self.client.connect("127.0.0.1", port)
         self.client.loop_start()
         for topic in topics:
