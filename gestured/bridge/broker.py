@@ -6,7 +6,7 @@ import ssl
 from collections.abc import Callable
 from typing import Any
 
-from gestured.bridge.options import BridgeError, peer_address
+from gestured.bridge.options import LONGEST_S, BridgeError, peer_address
 from gestured.core.messages import quoted
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
@@ -81,10 +81,10 @@ class Broker:
         client.connect(self.address.host, self.address.port, KEEPALIVE_S, clean_start=True, properties=most)
         client.loop_start()
 
-    def why(self, error: Any, *, soon: bool) -> str:
+    def why(self, error: Any, held_s: float | None) -> str:
         """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help.
 
-        `soon`: the broker had just let us in.
+        `held_s` is for how long the broker had let us in; None where it had not.
         """
         said, code = str(error), getattr(error, "value", 0)
         if "CERTIFICATE_VERIFY_FAILED" in said:
@@ -99,8 +99,11 @@ class Broker:
             return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
         if code != CLOSED:
             return said
-        who = f" at once: does another bridge have the name gestured-{self._host}? (--host)" if soon else ""
-        return f"it closed the connection{who}"
+        if held_s is None:
+            asks = "is it one with TLS: --tls?" if self._tls is None else "does it ask for a --cert that it knows?"
+            return f"it closed the connection before it let us in ({asks})"
+        who = f" at once: does another bridge have the name gestured-{self._host}? (--host)"
+        return f"it closed the connection{who if held_s < LONGEST_S else ''}"
 
     def hear(self, client: Any, topic: str) -> None:
         """Subscribe to commands: none that is retained, and each with the word whether it shall be."""

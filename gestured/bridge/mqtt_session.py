@@ -157,12 +157,12 @@ class Mqtt:
         """A connection has ended, or could not be."""
         if client is not self._client:
             return
-        let_in, self._client, self._connected = self._connected, None, False
-        soon = let_in and time.monotonic() < self._since + LONGEST_S
-        if let_in and not soon:
+        held_s = time.monotonic() - self._since if self._connected else None
+        self._client, self._connected = None, False
+        if held_s is not None and held_s >= LONGEST_S:
             self._wait_s = FIRST_S
         if not self._stopping:
-            why = self._broker.why(error, soon=soon)
+            why = self._broker.why(error, held_s)
             words = f"broker {self._broker.address} is not there: {why}; trying again"
             self._counts.connected("broker", False, words)
             self._due = time.monotonic() + self._wait_s

@@ -502,7 +502,13 @@ def test_a_certificate_of_somebody_else_is_refused(bridge, broker, fake, certifi
 def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, certificates: Path):
     at = broker(*tls(certificates), "user root")
     process = begin(bridge, at, fake)
-    assert at.address in process.until("trying again")
+    assert f"{at.address} is not there: it closed the connection" in process.until("is it one with TLS: --tls?")
+
+
+def test_a_broker_that_wants_a_certificate_says_so(bridge, broker, fake, certificates: Path):
+    at = broker(*tls(certificates), f"cafile {certificates}/ca.pem", "require_certificate true", "user root")
+    process = begin(bridge, at, fake, "--tls", "--ca", certificates / "ca.pem")
+    process.until("does it ask for a --cert that it knows?")
 
 
 def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, fake, tmp_path: Path):
