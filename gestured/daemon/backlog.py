@@ -11,6 +11,7 @@ from gestured.daemon.mute import Sender
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
 GROUP, GROUP_BYTES = 256, 128 << 10  # packets, and bytes of several packets, in one go at the most
+ROOM_BYTES = 52 << 10  # a quarter of the smallest buffer that a kernel grants
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
 FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
@@ -69,9 +70,9 @@ class Backlog:
         return bool(self._packets)
 
     @property
-    def reads(self) -> float:
-        """How many groups of the largest size would hold what waits."""
-        return max(len(self._packets) / GROUP, self._bytes / GROUP_BYTES)
+    def full(self) -> float:
+        """What waits, as a share of the packets that a read takes, or of ROOM_BYTES."""
+        return max(len(self._packets) / GROUP, self._bytes / ROOM_BYTES)
 
     @property
     def oldest(self) -> float:

@@ -25,10 +25,7 @@ from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
 SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
-# Of work on waiting packets in a flood, at least and at most. The kernel's buffer fills meanwhile, but packets that are
-# served together cost a fraction: where a read finds less than ROOM of the most that it takes, work goes on until half
-# of ROOM has come again.
-FLOOD_SLICE_S, ROOM = (0.001, 0.01), 0.4
+FLOOD_SLICE_S = 0.001, 0.01  # of work on waiting packets in a flood, at least and at most; see `Receiver._slice`
 TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
 DRAIN_S = 0.25  # for serving what still waits when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick, since waking for each is much of its price
@@ -191,10 +188,7 @@ class Receiver:
         self._backlog.worked(time.thread_time() - before, self._clock())
 
     def _work_fairly(self, now: float) -> None:
-        least, most = FLOOD_SLICE_S
-        reads, since, self._shared = self._backlog.reads, now - self._shared, now
-        again = since * ROOM / 2 / reads if reads < ROOM else least
-        served, dropped = self._backlog.share(min(max(again, least), most), now)
+        served, dropped = self._backlog.share(self._slice(now), now)
         start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
         for n, group in enumerate(served):
             if before > start + TURN_S:
@@ -212,6 +206,16 @@ class Receiver:
                 self._desk.muted(blamed)
                 self._mute(now, blamed)
                 self._backlog.flood(now + LONGEST_S + FLOOD_S)  # those who are heard again are held back at once
+
+    def _slice(self, now: float) -> float:
+        """For how long to work in this turn of a flood, in s.
+
+        The kernel's buffer fills meanwhile, but packets that are served together cost a fraction. So work goes on until
+        half of what a read takes has come again, but not where the last read may have left some in the socket.
+        """
+        least, most = FLOOD_SLICE_S
+        full, since, self._shared = self._backlog.full, now - self._shared, now
+        return min(max(since / 2 / full, least), most) if full < 1 else least
 
     def _mute(self, now: float, changed: Sequence[Sender]) -> None:
         """Have the kernel throw away what comes from senders of a flood: unread, it fills the socket's buffer."""
