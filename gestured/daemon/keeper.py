@@ -34,7 +34,7 @@ class Keeper:
 
     def read(self) -> None:
         """Read the file, and lock it where its folder is there: who enrols nothing needs none."""
-        if self.path is not None and self.path.parent.is_dir():
+        if self.path is not None and os.path.isdir(self.path.parent):  # Path.is_dir raises where we may not look
             try:
                 self.hold()
             except OwnFileError as error:

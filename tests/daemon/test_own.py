@@ -268,6 +268,7 @@ def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: B
     ("flags", "env", "words"),
     [
         (("--own-gestures", "/proc/own-gestures.json"), {}, r"/proc/own-gestures\.json: cannot be written"),
+        (("--own-gestures", f"/{'a' * 256}/own.json"), {}, r"own\.json: cannot be read: File name too long"),
         ((), {"STATE_DIRECTORY": "", "XDG_STATE_HOME": "", "HOME": ""}, "no home: .*--own-gestures FILE"),
     ],
 )

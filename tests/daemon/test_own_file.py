@@ -89,6 +89,15 @@ def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: 
     assert own_file.where(Path("mine.json"), environ) == Path("mine.json")
 
 
+def test_a_folder_into_which_we_may_not_look_is_a_fault_of_the_file(tmp_path: Path, nobody) -> None:
+    """As where a service's account was left the HOME of root."""
+    tmp_path.chmod(0o700)
+    keeper = Keeper(tmp_path / "state" / "own.json")
+    with nobody():
+        keeper.read()
+    assert keeper.fault == f"{keeper.path}: cannot be read: Permission denied"
+
+
 def test_a_folder_is_made_where_something_is_enrolled_and_not_before(tmp_path: Path) -> None:
     path = tmp_path / "state" / "gestured" / "own.json"
     keeper = Keeper(path)
