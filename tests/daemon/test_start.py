@@ -197,6 +197,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         (("--own-gestures", "/"), {}, "", ("own_gestures", "'/'", "expected the path of a file")),
         ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
+        ((), {}, f"stale_s = {'1' * 5000}", ("gestured.toml", "TOML", "4300 digits")),
         (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),
     ],
 )
