@@ -156,7 +156,7 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
             ("flight_recorder = 4", ["flight_recorder"]),
             ("flight_recorder = 4\ntap_gap_s = 0.4", ["flight_recorder"]),
             ("tap_gap_s = 0.4", []),
-            ("tap_gap_s = 0.4\n[gates]\nstart = ['door']", ["gates"]),
+            ("tap_gap_s = 0.4\n[gates]\nstart = ['door']\nsocket = '/tmp/gates'", ["gates"]),
         ):
             config.write_text(text)
             assert control.ask("reload")["awaiting_restart"] == named
