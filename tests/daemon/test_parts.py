@@ -14,6 +14,8 @@ from types import SimpleNamespace
 import pytest
 
 from gestured.core.address import Address
+from gestured.core.events import Gate
+from gestured.core.hub import REMEMBERED
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.core.wire import Decoder
@@ -23,6 +25,7 @@ from gestured.daemon.merge import load_settings
 from gestured.daemon.service import Service
 from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp
 from gestured.daemon.status import healthy, overall, status
+from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
@@ -102,6 +105,15 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(parts
     assert capfd.readouterr().err.count("ZeroDivisionError: a bug") == 1  # logged at a bounded rate
     parts.feed("bad", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), t + 1)
     assert [type(e).__name__ for e in events[-3:]] == ["Onset", "Gesture", "Release"] and events[-1].sensor == "bad"
+
+
+def test_the_flight_recorder_knows_what_the_latest_sensors_listen_to_and_no_more_of_them_than_the_hub() -> None:
+    """Whoever may send can invent names for years."""
+    taps = Taps(1000)
+    for n in range(REMEMBERED + 100):
+        taps.publish(Gate(f"s{n}", False, (), None, 0.0), 0.0)
+    told = [json.loads(line)["sensor"] for line in taps.flight()]
+    assert len(told) <= REMEMBERED + 10 and told[-1] == f"s{REMEMBERED + 99}"
 
 
 def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> None:
