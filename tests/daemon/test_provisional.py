@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message import OscMessage
 
 import gestured
@@ -181,16 +180,6 @@ def test_over_osc_it_is_said_and_revoked_where_the_setting_has_it(udp: socket.so
         message = OscMessage(udp.recv(9999))
         told = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
         assert (message.address, told, message.params) == (f"/gestured/arm/{what}", types, params)
-
-
-def test_over_osc_a_made_up_one_is_marked_as_the_gesture_is(start, early: Path, udp: socket.socket) -> None:
-    to = f"osc://127.0.0.1:{udp.getsockname()[1]}"
-    start("--publish", to, "--publish-provisional", "true", model=early).ask("emit", gesture="swipe_left")
-    for what in ("provisional", "gesture"):
-        while (packet := udp.recv(9999)).startswith(b"/gestured/status"):
-            pass
-        marked = [one.address for one in OscBundle(packet)]
-        assert marked[:2] == ["/gestured/test", f"/gestured/test/{what}"]
 
 
 def test_in_a_process_of_ones_own(early: Path) -> None:
