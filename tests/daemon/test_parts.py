@@ -6,10 +6,9 @@ import ipaddress
 import json
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -19,7 +18,7 @@ from gestured.core.hub import REMEMBERED
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.core.wire import Decoder
-from gestured.daemon import http, log, udp
+from gestured.daemon import http, log
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load_settings
 from gestured.daemon.service import Service
@@ -177,37 +176,6 @@ async def test_what_waits_since_the_socket_was_bound_keeps_its_times(
         receiver.close()
     apart = moments[2] - moments[1]
     assert len(served) == 2 and served[1] - served[0] >= apart - 1e-4  # s, by which the two clocks may drift
-
-
-@pytest.mark.parametrize("call", range(8))
-async def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
-    parts: Parts, monkeypatch: pytest.MonkeyPatch, call: int
-) -> None:
-    """Both clocks leap by ten seconds at one of the looks at them, and a packet arrives just before that."""
-    calls, leap, sent, served = -100, 0.0, 0.0, []  # the looks at a clock before the first read do not count
-    receive = parts.hub.receive
-    monkeypatch.setattr(parts.hub, "receive", lambda packets, now: served.append(now) or receive(packets, now))
-
-    with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-        sender.connect(sock.getsockname())
-
-        def look(clock: Callable[[], float]) -> float:
-            nonlocal calls, leap, sent
-            if calls == call:
-                sent = time.monotonic()
-                sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
-                leap = 10.0
-            calls += 1
-            return clock() + leap
-
-        receiver = Receiver(sock, time.monotonic(), parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
-        calls = 0
-        clocks = {name: getattr(time, name) for name in ("monotonic", "thread_time")}
-        monkeypatch.setattr(udp, "time", SimpleNamespace(**clocks, time=lambda: look(time.time)))
-        while not served:
-            receiver.read()
-        receiver.close()
-    assert served[0] - sent < 5.0
 
 
 def test_health_and_readiness_say_what_is_wrong(model: Path, tmp_path: Path) -> None:
