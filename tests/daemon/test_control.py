@@ -4,7 +4,6 @@ import json
 import os
 import re
 import socket
-import stat
 import subprocess
 import sys
 import tempfile
@@ -35,12 +34,6 @@ def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory):
     yield daemon
     assert daemon.stop() == 0
     assert "Traceback" not in daemon.stderr()
-
-
-def test_it_stands_beside_the_event_socket_for_owner_and_group(daemon: Daemon) -> None:
-    path = Path(daemon.ready["control"])
-    assert path == daemon.socket.with_suffix(".ctl")
-    assert stat.S_IMODE(path.stat().st_mode) == 0o660
 
 
 def test_it_cannot_stand_where_the_event_socket_stands(tmp_path: Path) -> None:

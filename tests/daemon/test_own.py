@@ -293,9 +293,7 @@ def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
     assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"slash"}
 
 
-def test_another_model_takes_the_examples_over_or_says_that_they_are_off(
-    begin: Begin, tmp_path: Path, model: Path
-) -> None:
+def test_another_model_takes_the_examples_over_or_says_that_they_are_off(begin: Begin, model: Path) -> None:
     daemon = begin()
     sensor = ready(daemon)
     enrol(daemon, sensor)

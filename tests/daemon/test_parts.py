@@ -51,7 +51,7 @@ def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tm
     assert load_settings({"config": str(path)}, {})[0].model == "file"
 
 
-def test_lists_are_written_with_commas_or_repeated(tmp_path: Path) -> None:
+def test_lists_are_written_with_commas_or_repeated() -> None:
     env = {"GESTURED_PUBLISH": "osc://127.0.0.1:1, osc://[::1]:2", "GESTURED_ALLOW": "10.0.0.0/8,::1"}
     settings, _ = load_settings({"gestures": "one_tap,swipe_left"}, env)
     assert [str(a) for a in settings.publish] == ["osc://127.0.0.1:1", "osc://[::1]:2"]
