@@ -125,34 +125,6 @@ def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> Non
     assert metrics.frames.values == {("a", "ok"): 2}
 
 
-@pytest.mark.parametrize(("apart", "taken"), [(0.067, 5), (0.0, 1)])
-async def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
-    parts: Parts, monkeypatch: pytest.MonkeyPatch, apart: float, taken: int
-) -> None:
-    metrics = parts.metrics
-    hand, rests, now = Hand(), [], 0.0
-
-    async def turn() -> None:
-        for _ in range(3):
-            await asyncio.sleep(0)
-
-    loop = asyncio.get_running_loop()
-    monkeypatch.setattr(loop, "call_later", lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop))
-    with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-        receiver = Receiver(sock, now, parts.hub, parts.desk, parts.taps, lambda: now)
-        sender.connect(sock.getsockname())
-        for k in range(5):
-            now += apart
-            sender.send(harness.floats("/a/pressure", hand.frame(), k))
-            await turn()
-        assert metrics.frames.values == {("a", "ok"): taken} and len(rests) == (taken < 5)
-        for listen in rests:
-            listen()
-        await turn()
-        assert metrics.frames.values == {("a", "ok"): 5}
-        receiver.close()
-
-
 async def test_what_waits_since_the_socket_was_bound_keeps_its_times(
     parts: Parts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
