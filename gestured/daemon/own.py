@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -124,8 +125,8 @@ class OwnGestures:
         model = self._ladder.model
         if model.space is None:
             raise Refusal(f"{self.off}: own gestures are off while it answers")
-        judge = Examiner(model, model.space, self._ladder.own, in_use)
-        self._open = Enrolment(name, sensor, examples, judge), connection
+        self._examiner = partial(Examiner, model, model.space, in_use=in_use)
+        self._open = Enrolment(name, sensor, examples, self._examiner(self._ladder.own)), connection
         self._heard = time.monotonic()
         connection.streams = True  # so that it is not ended for asking nothing
 
@@ -190,7 +191,10 @@ class OwnGestures:
         async with self.writing:
             ladder = self._ladder
             await asyncio.to_thread(self._keeper.change, change, ladder.model.sha256)
-            self._use(await asyncio.to_thread(ladder.compared, self._keeper.found.gestures))
+            own = await asyncio.to_thread(ladder.compared, self._keeper.found.gestures)
+            self._use(own)
+        if self._open is not None:
+            self._open[0].judge = self._examiner(own)  # what was forgotten speaks against no example any more
         self._changed()
 
     def _check(self, name: str, gestures: Examples) -> None:

@@ -172,6 +172,9 @@ def test_each_example_is_judged_at_once(begin: Begin) -> None:
     sensor.slash()
     line = again.line()
     assert (line["kept"], "the same as slash" in line["reason"]) == (False, True)
+    daemon.ask("forget", name="slash")  # which makes room for it
+    sensor.slash()
+    assert again.line()["kept"] is True and again.line() == {"enrolled": "cut", "examples": 1}
 
 
 def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_path: Path) -> None:
