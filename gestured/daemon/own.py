@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.core.events import Cancelled
+from gestured.core.events import Cancelled, Unknown
 from gestured.core.facts import Decided, Fact
 from gestured.core.messages import json_line
 from gestured.core.own import EXAMPLES, MOST, Examples, is_name
@@ -23,6 +23,11 @@ from gestured.model.own_file import OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # a contact so cancelled was `Decided`, too, and counts once
+
+
+def silent(sensor: str, gates: Collection[str]) -> str:
+    """Why nothing can be enrolled on a sensor while these gates are closed."""
+    return f"{sensor} is silent, since gates are closed: {', '.join(gates)}; allow them first"
 
 
 class OwnGestures:
@@ -132,14 +137,20 @@ class OwnGestures:
 
     def see(self, fact: Fact) -> None:
         """Look at a fact of the hub: each answer of the sensor is an attempt."""
-        if self._open is None or not isinstance(fact, Decided | Cancelled):
+        if self._open is None or not isinstance(fact, Decided | Cancelled | Unknown):
             return
         enrolment, connection = self._open
         if enrolment.complete or fact.sensor != enrolment.sensor:
             return
         if isinstance(fact, Cancelled) and fact.reason == ANSWERED_TWICE:
             return
+        if isinstance(fact, Unknown) and not fact.gates:
+            return  # it was `Decided`, too
         self._heard = time.monotonic()
+        if isinstance(fact, Unknown):
+            reason = silent(fact.sensor, fact.gates)
+            connection.send(json_line({"example": len(enrolment.kept) + 1, "kept": False, "reason": reason}))
+            return
         try:
             told = enrolment.see(fact.segment if isinstance(fact, Decided) else fact)
         except GesturedError as error:  # the model failed

@@ -207,6 +207,19 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
     assert daemon.ask("gestures")["own"]["gestures"] == {"cut": 2}
 
 
+def test_what_is_performed_while_a_gate_is_closed_is_answered_too(begin: Begin) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    enrolment = Enrolment(daemon, "slash", examples=1)
+    daemon.ask("inhibit", gate="door")
+    sensor.slash()
+    reason = "armrest is silent, since gates are closed: door; allow them first"
+    assert enrolment.line() == {"example": 1, "kept": False, "reason": reason}
+    daemon.ask("allow", gate="door")
+    sensor.slash()
+    assert enrolment.line()["kept"] is True and enrolment.line() == {"enrolled": "slash", "examples": 1}
+
+
 def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:
     daemon = begin()
     sensor = ready(daemon)
