@@ -12,7 +12,7 @@ from gestured.record import arrays as recording
 from gestured.record import tape_writer
 from gestured.record.files import PUBLIC, atomic_write, open_regular
 from tests.opening import no_file
-from tests.small_recording import example, session
+from tests.small_recording import session
 
 PACKAGE = Path(__file__).parent.parent / "gestured"
 
@@ -81,14 +81,6 @@ def test_the_name_of_what_is_being_written_cannot_be_foreseen(tmp_path: Path) ->
         with atomic_write(tmp_path / "a.bin"):
             names |= {path.name for path in tmp_path.glob(".a.bin.*")}
     assert len(names) == 8 and not any(str(os.getpid()) == name.rpartition(".")[2] for name in names)
-
-
-def test_a_recording_is_not_written_through_a_planted_link(tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    victim.write_bytes(b"precious")
-    (tmp_path / f".07.npz.{os.getpid()}").symlink_to(victim)
-    recording.write(tmp_path / "07.npz", example())
-    assert victim.read_bytes() == b"precious" and len(recording.read(tmp_path / "07.npz")) == 2
 
 
 def test_recordings_and_tapes_are_their_owners_alone(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import ssl
 from collections.abc import Callable
 from typing import Any
 
-from gestured.bridge.options import BridgeError, peer_address
+from gestured.bridge.options import LONGEST_S, BridgeError, peer_address
 from gestured.core.messages import quoted
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
@@ -81,10 +81,10 @@ class Broker:
         client.connect(self.address.host, self.address.port, KEEPALIVE_S, clean_start=True, properties=most)
         client.loop_start()
 
-    def why(self, error: Any, *, soon: bool) -> str:
+    def why(self, error: Any, held_s: float | None) -> str:
         """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help.
 
-        `soon`: the broker had just let us in.
+        `held_s` is for how long the broker had let us in; None where it had not.
         """
         said, code = str(error), getattr(error, "value", 0)
         if "CERTIFICATE_VERIFY_FAILED" in said:
@@ -99,8 +99,11 @@ class Broker:
             return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
         if code != CLOSED:
             return said
-        who = f" at once: does another bridge have the name gestured-{self._host}? (--host)" if soon else ""
-        return f"it closed the connection{who}"
+        if held_s is None:
+            asks = "is it one with TLS: --tls?" if self._tls is None else "does it ask for a --cert that it knows?"
+            return f"it closed the connection before it let us in ({asks})"
+        who = f" at once: does another bridge have the name gestured-{self._host}? (--host)"
+        return f"it closed the connection{who if held_s < LONGEST_S else ''}"
 
     def hear(self, client: Any, topic: str) -> None:
         """Subscribe to commands: none that is retained, and each with the word whether it shall be."""
@@ -108,12 +111,18 @@ class Broker:
 
         client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
 
-    def refusal(self, code: object) -> BridgeError:
+    def unwritable(self, code: object) -> BridgeError:
         """What is to be said where the broker does not take what we publish."""
-        return BridgeError(
-            f"the broker {self.address} does not let us publish ({code}): allow this user to write "
-            f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/# in its access list"
-        )
+        topics = f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/#"
+        return self._unallowed(f"publish ({code})", f"write {topics}")
+
+    def unreadable(self, code: object, topic: str) -> BridgeError:
+        """What is to be said where the broker does not let us hear commands."""
+        return self._unallowed(f"hear commands ({code})", f"read {topic}")
+
+    def _unallowed(self, what: str, right: str) -> BridgeError:
+        said = f"the broker {self.address} does not let us {what}"
+        return BridgeError(f"{said}: allow this user to {right} in its access list")
 
 
 def _variable(name: str) -> str | None:
@@ -149,7 +158,7 @@ def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:
             raise BridgeError("--ca and --cert are for encrypted connections: add --tls")
         return None
     for flag, path in (("--ca", args.ca), ("--cert", args.cert)):
-        if path is not None and not os.access(path, os.R_OK):
+        if path is not None and (path.is_dir() or not os.access(path, os.R_OK)):
             raise BridgeError(f"{flag} {path}: there is no such file that we may read")
     try:
         context = ssl.create_default_context(cafile=args.ca)

@@ -55,7 +55,7 @@ class Counts:
         self.values[key] = is_there
         self.say(words)
         self._words[side] = words
-        here = all(value for (name, _), value in self.values.items() if name == "connected")
+        here = all(self.values["connected", each] for each in self._words)
         # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.
         notify(f"READY=1\nSTATUS={'connected' if here else 'waiting'}: {'; '.join(self._words.values())}")
 

@@ -9,8 +9,8 @@ from gestured.client.subscriber import Subscriber
 from gestured.core.address import is_sensor
 from gestured.core.messages import quoted
 
-NOTICE_S = 0.25  # after which a daemon that went is noticed
-GONE = "gone"  # the type of a line of ours: the daemon hung up, and is called until it is back
+NOTICE_S = 0.25  # after which a daemon that is not there is noticed
+GONE = "gone"  # the type of a line of ours: the daemon is not there, or has hung up, and is called until it is back
 MOST_SENSORS = 4096  # names that are remembered: whoever can send frames can invent some
 DRIFT = 0.1  # s in a second by which a sensor's clock may run away from ours; real ones do a ten-thousandth of it
 OLD_S = 1.0  # an event that is older helps nobody any more: the window would open a second late
@@ -19,24 +19,24 @@ Line = Mapping[str, Any]
 
 
 def follow(subscriber: Subscriber, counts: Counts) -> Iterator[Line]:
-    """Each line of a daemon, its hello among them, and GONE where it went; until the subscriber is closed.
+    """Each line of a daemon, its hello among them, and GONE where it is not there; until the subscriber is closed.
 
     The subscriber has a timeout of NOTICE_S. A line with a name that cannot stand in a topic is passed over.
     """
-    connected = False
+    missed = False
     while True:
         try:
             for _, line in subscriber.lines():
                 if words := _wrong_name(line):
                     counts.wrong(f"a line of the daemon is passed over: {words}")
                     continue
-                connected = connected or line["type"] == "hello"
+                missed = missed and line["type"] != "hello"
                 yield line
             return
         except TimeoutError:
-            if connected and not subscriber.connected:
-                connected = False
-                yield {"type": GONE}
+            if not missed and not subscriber.connected:
+                missed = True
+                yield {"type": GONE, "path": str(subscriber.path)}
 
 
 def _wrong_name(line: Line) -> str | None:
@@ -78,7 +78,7 @@ class Daemon:
                 self._heard(line["sensors"])
             case "gone":
                 self.hello = {}
-                self._counts.connected("daemon", False, "daemon went")
+                self._counts.connected("daemon", False, f"no daemon on {line['path']}; waiting for it")
 
     def silent_by(self, gate: str) -> list[str]:
         """The sensors for which that gate is closed."""

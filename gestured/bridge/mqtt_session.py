@@ -23,7 +23,7 @@ COMMAND = ("gate", "set")  # below a sensor, in a topic
 EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
 LAST_S = 1.0  # for the broker's answer to our good-bye; without it, it publishes our last will
 WAITING_EVENTS = 1000  # events that are kept for the broker; more than a second of the busiest daemon
-IN_FLIGHT = 18  # events whose acknowledgement is awaited at a time; mosquitto takes 20 messages
+IN_FLIGHT = 20  # messages whose acknowledgement is awaited at a time, where the broker does not ask for fewer
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +49,7 @@ class Mqtt:
         self._counts = counts
         self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._gate = None if args.gates is None else Gate(args.gates, args.gate, counts)
+        self._commanded = topic_of(self._host, "+", *COMMAND)
         gate = None if self._gate is None else self._gate.name
         self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
         self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
@@ -65,6 +66,7 @@ class Mqtt:
         self._changes: Iterator[tuple[str, str]] = iter(())
         self._change = 0  # number of the one that it has not acknowledged
         self._farewell = 0  # number of our last word
+        self._most = 0  # messages that may be in flight, before our last word
 
     def stop(self) -> None:
         """Say good-bye, and let `work` end; at once, whatever else waits."""
@@ -118,8 +120,8 @@ class Mqtt:
         """Call the broker, in a thread of its own: a name that is not known may take its time."""
         client = self._client = self._broker.client(self._availability)
 
-        def told(what: Callable[[Any, Any], None], argument: int) -> Callable[..., None]:
-            return lambda *arguments: self._inbox.put(partial(what, client, arguments[argument]))
+        def told(what: Callable[..., None], *which: int) -> Callable[..., None]:
+            return lambda *given: self._inbox.put(partial(what, client, *(given[n] for n in which)))
 
         def call() -> None:
             try:
@@ -127,22 +129,24 @@ class Mqtt:
             except OSError as error:
                 self._inbox.put(partial(self._gone, client, error))
 
-        client.on_connect = told(self._there, 3)
+        client.on_connect = told(self._there, 3, 4)
         client.on_disconnect = told(self._gone, 3)
         client.on_failure = told(self._gone, 0)
+        client.on_subscribe = told(self._subscribed, 3)
         client.on_message = lambda _, __, message: self._hear(message)
-        client.on_publish = lambda _, __, number, code, ___: self._inbox.put(partial(self._taken, client, number, code))
+        client.on_publish = told(self._taken, 2, 3)
         threading.Thread(target=call, name="broker", daemon=True).start()
 
-    def _there(self, client: Any, code: Any) -> None:
-        """The broker has answered our call."""
+    def _there(self, client: Any, code: Any, terms: Any) -> None:
+        """The broker has answered our call, and says on which terms we may be there."""
         if code.is_failure:
             self._gone(client, code)
             return
         self._connected, self._since = True, time.monotonic()
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
+        self._most = max(min(IN_FLIGHT, getattr(terms, "ReceiveMaximum", IN_FLIGHT)) - 1, 1)
         if self._gate is not None:
-            self._broker.hear(client, topic_of(self._host, "+", *COMMAND))
+            self._broker.hear(client, self._commanded)
         self._retained.forget()
         self._changed, self._changes, self._change = True, iter(()), 0
         self._waiting.extendleft(reversed(self._sent.values()))  # what it has not acknowledged, before all else
@@ -153,12 +157,12 @@ class Mqtt:
         """A connection has ended, or could not be."""
         if client is not self._client:
             return
-        let_in, self._client, self._connected = self._connected, None, False
-        soon = let_in and time.monotonic() < self._since + LONGEST_S
-        if let_in and not soon:
+        held_s = time.monotonic() - self._since if self._connected else None
+        self._client, self._connected = None, False
+        if held_s is not None and held_s >= LONGEST_S:
             self._wait_s = FIRST_S
         if not self._stopping:
-            why = self._broker.why(error, soon=soon)
+            why = self._broker.why(error, held_s)
             words = f"broker {self._broker.address} is not there: {why}; trying again"
             self._counts.connected("broker", False, words)
             self._due = time.monotonic() + self._wait_s
@@ -169,7 +173,7 @@ class Mqtt:
         if client is not self._client:
             return
         if code.is_failure:
-            raise self._broker.refusal(code)
+            raise self._broker.unwritable(code)
         if number == self._farewell:
             client.disconnect()
         elif number == self._change:
@@ -177,6 +181,11 @@ class Mqtt:
         elif self._sent.pop(number, None) is not None:
             self._counts.add("events", "sent")
         self._send()
+
+    def _subscribed(self, client: Any, codes: Any) -> None:
+        """The broker has answered whether we may hear commands."""
+        if client is self._client and codes[0].is_failure:
+            raise self._broker.unreadable(codes[0], self._commanded)
 
     def _hear(self, message: Any) -> None:
         """A command, in the library's thread. Of several for one sensor that have not been obeyed the last counts."""
@@ -208,14 +217,7 @@ class Mqtt:
         """Publish what waits, as far as the broker keeps up."""
         if not self._connected or self._stopping:
             return
-        while self._waiting and len(self._sent) < IN_FLIGHT:
-            event = self._waiting.popleft()
-            if time.monotonic() - event.decided > OLD_S:
-                self._counts.add("events", "old")
-                continue
-            fresh = properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
-            self._sent[self._publish(event.topic, event.payload, properties=fresh)] = event
-        while not self._change:
+        while not self._change and len(self._sent) < self._most:
             change = next(self._changes, None)
             if change is not None:
                 self._change = self._publish(*change, retain=True)
@@ -223,6 +225,13 @@ class Mqtt:
                 self._changed, self._changes = False, self._retained.changes()
             else:
                 break
+        while self._waiting and len(self._sent) + bool(self._change) < self._most:
+            event = self._waiting.popleft()
+            if time.monotonic() - event.decided > OLD_S:
+                self._counts.add("events", "old")
+                continue
+            fresh = properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
+            self._sent[self._publish(event.topic, event.payload, properties=fresh)] = event
         if not self._change and self._daemon.hello:
             self._counts.ready(broker=str(self._broker.address), host=self._host)
 

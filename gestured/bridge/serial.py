@@ -18,7 +18,7 @@ from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped
 from gestured.client.program import Commands, on_stop
 from gestured.client.sensor import Form, connected, sent_after_refusal
-from gestured.client.values import rows_by_columns, sensor_name
+from gestured.client.values import number, rows_by_columns, sensor_name
 from gestured.core.frames import Frame
 
 KEPT = 8  # frames that are sent where more have come at once: the newest
@@ -43,7 +43,8 @@ def add(commands: Commands) -> None:
     parser.add_argument("device", metavar="DEVICE", help="such as /dev/ttyUSB0, or a link in /dev/serial/by-id")
     parser.add_argument("--protocol", required=True, choices=tuple(PROTOCOLS), help="what the sensor speaks")
     parser.add_argument("--sensor", type=sensor_name, required=True, metavar="NAME", help="its name for the daemon")
-    parser.add_argument("--baud", type=int, metavar="N", help="bits a second (default: as the protocol's sensors)")
+    text = "bits a second (default: as the protocol's sensors)"
+    parser.add_argument("--baud", type=number(1, 10**9, whole=True), metavar="N", help=text)
     text = "rows and columns (default: 16x16 for flexitac and e256, else 9x9)"
     parser.add_argument("--grid", type=rows_by_columns, metavar="RxC", help=text)
     add_destination(parser)
@@ -103,23 +104,23 @@ class Serial:
         """The device; None where it is to be waited for."""
         import serial
 
+        none = f"{self._device}: is no serial device: ls -l /dev/serial/by-id shows those that are"
         try:
             if not stat.S_ISCHR(os.stat(self._device).st_mode):
-                raise BridgeError(f"{self._device}: is no serial device: ls -l /dev/serial/by-id shows those that are")
+                raise BridgeError(none)
             return serial.Serial(self._device, self._baud, timeout=0, write_timeout=ANSWER_S, exclusive=True)
         except ValueError:
             raise BridgeError(f"--baud {self._baud}: this device does not take it") from None
         except OSError as error:  # SerialException is one
-            number = error.errno
-            said = os.strerror(number) if number else str(error)
-            if number == errno.EACCES and not self._opened:  # a device that is plugged in anew is root's for a moment
+            code = error.errno
+            said = os.strerror(code) if code else str(error)
+            if code == errno.EACCES and not self._opened:  # a device that is plugged in anew is root's for a moment
                 remedy = 'sudo adduser "$USER" dialout, and log in again'
                 raise BridgeError(f"{self._device}: {said}: it is for members of its group ({remedy})") from None
-            if number == errno.EAGAIN:
+            if code == errno.EAGAIN:
                 raise BridgeError(f"{self._device}: another program has it open: end that one first") from None
-            if number is None and "onfigure" in said:
-                remedy = "ls -l /dev/serial/by-id shows those that are"
-                raise BridgeError(f"{self._device}: is no serial device: {remedy}") from None
+            if code is None and "onfigure" in said:
+                raise BridgeError(none) from None
             self._counts.connected("device", False, f"{self._device} is not there: {said}; waiting for it")
             return None
 

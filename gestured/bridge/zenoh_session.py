@@ -165,6 +165,7 @@ def _configuration(args: argparse.Namespace) -> Any:
     """Zenoh's own, from the flags. Raises BridgeError."""
     import zenoh
 
+    where, expected = f"--config {args.config}", "expected Zenoh's configuration (JSON5)"
     try:
         config = zenoh.Config() if args.config is None else zenoh.Config.from_file(str(args.config))
         settings = {key: value for key, value in UNLESS_SAID.items() if config.get_json(key) == "null"}
@@ -172,10 +173,10 @@ def _configuration(args: argparse.Namespace) -> Any:
             config.insert_json5(key, json.dumps(value))
         calls_nobody = config.get_json("mode") == CLIENT and config.get_json("connect/endpoints") == "[]"
         if args.connect or calls_nobody:
+            where, expected = "--connect", f"an endpoint is such as {ROUTER}"
             config.insert_json5("connect/endpoints", json.dumps(args.connect or [ROUTER]))
     except zenoh.ZError as error:
-        where = f"--config {args.config}" if args.config else "--connect"
-        raise BridgeError(f"{where}: {_first_words(error)}: an endpoint is such as {ROUTER}") from None
+        raise BridgeError(f"{where}: {_first_words(error)}: {expected}") from None
     return config
 
 

@@ -3,23 +3,34 @@
 import argparse
 import os
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from gestured.client.address import find_control, find_socket, setting
+from gestured.client.address import SOCKET_PATH, control_beside, find_control, find_socket, setting
 from gestured.client.control import Control
+
+LAST_S = 3.0  # for the last lines of a daemon that is to say no more
 
 
 def add_sockets(parser: argparse.ArgumentParser) -> None:
     """Add `--control` and `--socket` to a subcommand: either is enough to find the daemon."""
     for flag, what in (("--control", "control"), ("--socket", "event")):
         text = f"the daemon's {what} socket; one of the two is enough (default: of your session, else the service)"
-        parser.add_argument(flag, type=Path, metavar="PATH", help=text)
+        parser.add_argument(flag, type=_path, metavar="PATH", help=text)
+
+
+def _path(text: str) -> Path:
+    path = Path(text)
+    if not path.name:  # as a variable that is not set leaves it
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {SOCKET_PATH}")
+    return path
 
 
 def control_path(args: argparse.Namespace) -> Path:
     """The control socket that `--control` or `--socket` means."""
     if args.control is None and args.socket is not None:
-        return Path(args.socket).with_suffix(".ctl")  # beside it, as the daemon has it unless told otherwise
+        return control_beside(args.socket)
     return args.control or find_control(os.environ)
 
 
@@ -38,9 +49,19 @@ def event_path(args: argparse.Namespace) -> Path:
             return Path(status["addresses"]["socket"])
 
 
+def finish(control: Control) -> None:
+    """Let `control.lines()` end: with what the daemon has said by now, or after LAST_S, since it may hang."""
+    control.finish()
+    _later(LAST_S, control.close)
+
+
 def finish_after(control: Control, seconds: float) -> None:
     """Let `control.lines()` end after so long."""
-    timer = threading.Timer(seconds, control.finish)
+    _later(seconds, partial(finish, control))
+
+
+def _later(seconds: float, act: Callable[[], object]) -> None:
+    timer = threading.Timer(seconds, act)
     timer.daemon = True
     timer.start()
 

@@ -49,5 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         given = sys.argv[1:] if argv is None else argv
         return program.run(parser(given), given)
+    except KeyboardInterrupt:  # while the modules of the command were imported: nothing has been done
+        return 1
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         return 0

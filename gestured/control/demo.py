@@ -23,7 +23,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number
-from gestured.control.play import add_arguments, frames, takes
+from gestured.control.play import add_arguments, frames, performance
 from gestured.control.show import Felt, Screen, as_dict, block, in_colour, in_words
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -57,7 +57,7 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
     stop_as_by_ctrl_c()
-    ((_, take),) = takes(args, args.seconds, first="circle_clockwise")
+    take = performance(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
     with Engine(args.model, rows, columns, "--flight-recorder", "4") as engine:  # the page can flag
@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
                 nullcontext("") if args.json else page(control) as address,
                 nullcontext() if args.json else pad(engine, args.grid, args.rate) as touched,
                 Subscriber(engine.socket, types=HEARD, sensors=[DEMO_SENSOR], reconnect=False) as stream,
-                closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
                 show.drawn(control),
+                sending(engine.listen, take) as sensor,
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
@@ -106,6 +106,19 @@ def pad(engine: Engine, grid: tuple[int, int], rate_hz: float) -> PadServer:
     return server.serve(engine.socket)
 
 
+@contextmanager
+def sending(to: Address, take: Take) -> Iterator[Sensor]:
+    """The simulated sensor, which sends its take meanwhile, and in the end has sent its last packet."""
+    with closing(Sensor(to, Form(DEMO_SENSOR))) as sensor:
+        sender = threading.Thread(target=sensor.send, args=(frames(0.0, take),), daemon=True)
+        sender.start()
+        try:
+            yield sensor
+        finally:
+            sensor.stop.set()
+            sender.join()
+
+
 def await_closed(server: PadServer) -> None:
     """Wait until no page shows the pad any more, or nobody has touched it for long."""
     shown = time.monotonic()
@@ -141,9 +154,8 @@ class Show:
             yield
 
     def follow(self, sensor: Sensor, stream: Subscriber) -> None:
-        """Send the take and show what comes of it, until its end; at a terminal also the finger as it moves."""
+        """Show what comes of the take as it is sent, until its end; at a terminal also the finger as it moves."""
         heard = read_ahead((time.time(), event) for event in stream)
-        threading.Thread(target=sensor.send, args=(frames(0.0, self.take),), daemon=True).start()
         ahead = list(self.take.events)
         end = sensor.moment(float(self.take.times[-1]) + SLACK_S)
         while (now := time.time()) < end:

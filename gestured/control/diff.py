@@ -1,16 +1,17 @@
 """What a recording's events and those of its replay have in common, and where they differ."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping
-from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from gestured.client.say import shown
+from gestured.control.show import clock
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
 CONFIDENCE_TOLERANCE = 0.05  # what a baseline learned at another moment may change
-STOPWATCH_S = 1e6  # times below are no dates
 
 Line = Mapping[str, Any]  # of the event stream; its times are the recording's
 Knew = Callable[[str, float], bool]  # whether a sensor's idle state was known at a time (s)
@@ -26,11 +27,8 @@ class Answer(NamedTuple):
 
     def words(self) -> str:
         """The answer as a line that a person reads."""
-        clock = f"{self.onset:.3f} s"
-        if self.onset >= STOPWATCH_S:
-            clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]
         sure = "" if self.confidence is None else f" {self.confidence:.3f}"
-        return f"{clock} {self.sensor}: {self.answer}{sure}"
+        return f"{clock(self.onset)} {self.sensor}: {self.answer}{sure}"
 
 
 class Difference(NamedTuple):
@@ -89,10 +87,13 @@ def answers(lines: Iterable[Line]) -> list[Answer]:
 
 def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Difference]:
     """Contacts are matched by their onsets; what is alike on both sides is left out."""
-    rest = sorted(after, key=lambda answer: answer.onset)
+    by_onset = attrgetter("onset")
+    rest = sorted(after, key=by_onset)
     found = []
-    for old in sorted(before, key=lambda answer: answer.onset):
-        near = [new for new in rest if new.sensor == old.sensor and abs(new.onset - old.onset) <= ONSET_S]
+    for old in sorted(before, key=by_onset):
+        first = bisect_left(rest, old.onset - ONSET_S, key=by_onset)
+        last = bisect_right(rest, old.onset + ONSET_S, key=by_onset)
+        near = [new for new in rest[first:last] if new.sensor == old.sensor]
         new = min(near, key=lambda answer: abs(answer.onset - old.onset), default=None)
         if new is not None:
             rest.remove(new)

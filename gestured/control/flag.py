@@ -1,10 +1,9 @@
 """`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
 
 import argparse
-from collections.abc import Iterator
 from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
-from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
@@ -45,24 +44,19 @@ def run(args: argparse.Namespace) -> int:
 
 
 def flag_path(folder: Path) -> Path:
-    """A name for what is flagged now."""
-    return folder / f"flag-{datetime.now():%Y%m%d-%H%M%S}.mcap"
+    """A name for what is flagged now, which no file has."""
+    stem = f"flag-{datetime.now():%Y%m%d-%H%M%S}"
+    names = chain([stem], (f"{stem}-{n}" for n in count(2)))
+    return next(path for name in names if not (path := folder / f"{name}.mcap").exists())
 
 
 def flag(control: Control, path: Path, note: str) -> Keeper:
     """Fetch what the flight recorder holds, and write it. Raises Refused where it is off, and Unreachable."""
     scene = control.ask("flight")
-
-    def lines() -> Iterator[dict[str, Any]]:
+    with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape, control.reading():
+        keeper = Keeper(tape, scene)
         for line in control.lines():
             if line["type"] == "end":
-                return
-            yield line
-        raise Unreachable(f"the daemon closed the connection; {path} is not complete")
-
-    with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape:
-        with control.reading():
-            keeper = Keeper(tape, scene)
-            for line in lines():
-                keeper.keep(line)
-    return keeper
+                return keeper
+            keeper.keep(line)
+    raise Unreachable(f"the daemon closed the connection; {path} is not complete")

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from gestured.client.sensor import Form
-from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
+from gestured.control.diff import Answer, Difference, Knew, Line, Verdict
+from gestured.control.show import STOPWATCH_S
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.core.scene import Scene

@@ -13,7 +13,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number, some_of
 from gestured.control.address import add_sockets, event_path
-from gestured.control.show import said_when
+from gestured.control.show import clock, said_when
 from gestured.control.status import listens
 from gestured.core.messages import EVENT_TYPES
 
@@ -54,11 +54,11 @@ def run(args: argparse.Namespace) -> int:
                 kind = event.get("type")
                 if args.json:
                     _repeat(line, event)
-                elif kind != "hello":
+                elif kind == "hello":
+                    told(_greeting(event))
+                else:
                     say(readable(event, early))
-                if kind == "hello":
-                    _greet(event, args)
-                elif left is not None and kind != "lost":
+                if left is not None and kind not in ("hello", "lost"):
                     left -= 1
                     if left <= 0:
                         return 0
@@ -73,8 +73,7 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
     moment = next((event[key] for key in TIMES if event.get(key) is not None), time.time())
-    clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
-    head = f"{clock}  {sensor:<12} "
+    head = f"{clock(moment):<12}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])
@@ -117,15 +116,10 @@ def went(where: dict[str, Any]) -> str:
     return f"from {start}{zone} to {end}" if where["way"] else f"at {start}{zone}"
 
 
-def _greet(hello: dict[str, Any], args: argparse.Namespace) -> None:
-    """Say whom it listens to, and which gestures that daemon will never send."""
-    known = ", ".join(hello["gestures"])
-    if not args.json:
-        names = ", ".join(hello["sensors"]) or "none yet"
-        say(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", to=sys.stderr)
-    for name in args.gesture or ():
-        if name not in hello["gestures"]:
-            say(f"no gesture of this daemon: {name} ({known})", to=sys.stderr)
+def _greeting(hello: dict[str, Any]) -> str:
+    """Whom it listens to."""
+    names = ", ".join(hello["sensors"]) or "none yet"
+    return f"gestured {hello['version']}, model {hello['model']}, sensors: {names}"
 
 
 def _repeat(line: str, event: dict[str, Any]) -> None:

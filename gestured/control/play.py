@@ -27,18 +27,20 @@ from gestured.simulator.places import PLACES
 KINDS = GESTURES + NON_GESTURES + SEQUENCES
 FIRST = 900  # the person of `--seed 0`; the models learned from 0 to 33
 OTHERS = 0.2  # share of performances that are no gesture, where no kinds are named
-PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
+PART_S = 600.0  # what is simulated at a time, at most; between two parts the sensor is off
+PART_COUNTS = 5_000_000  # in a part, which is shorter where frames are large or many: each takes some 50 bytes
+LEAST_S = 10.0  # of a part, in which something is performed
 OFF_S = 3.0
 UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
 BETWEEN_S = (1.0, 2.0)  # between performances
 
 
-def takes(args: argparse.Namespace, seconds: float | None, first: str | None = None) -> Iterator[tuple[float, Take]]:
+def takes(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
     """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0.
 
-    The same flags give the same frames. `first` is performed before all else, where they do not name kinds.
+    The same flags give the same frames.
     """
-    return _parts(lambda part, length: _take(args, part, length, first), seconds)
+    return _parts(args, seconds, lambda part, length: performance(args, length, part))
 
 
 def everyday(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
@@ -48,13 +50,17 @@ def everyday(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[
         seed = args.seed + part
         return day(seed, PLACES[args.everyday], length, _sensor(args, seed)).take
 
-    return _parts(lived, seconds)
+    return _parts(args, seconds, lived)
 
 
-def _parts(make: Callable[[int, float], Take], seconds: float | None) -> Iterator[tuple[float, Take]]:
+def _parts(
+    args: argparse.Namespace, seconds: float | None, make: Callable[[int, float], Take]
+) -> Iterator[tuple[float, Take]]:
+    rows, columns = args.grid
+    most = max(min(PART_S, PART_COUNTS / (rows * columns * args.rate)), LEAST_S)
     start, part = 0.0, 0
     while seconds is None or start < seconds:
-        length = PART_S if seconds is None else min(PART_S, seconds - start)
+        length = most if seconds is None else min(most, seconds - start)
         yield start, make(part, length)
         start, part = start + length + OFF_S, part + 1
 
@@ -66,7 +72,8 @@ def _sensor(args: argparse.Namespace, of_day: int) -> SimulatedSensor:
     return replace(nominal, rows=rows, columns=columns, pitch_mm=pitch, rate_hz=args.rate)
 
 
-def _take(args: argparse.Namespace, part: int, seconds: float, first: str | None) -> Take:
+def performance(args: argparse.Namespace, seconds: float, part: int = 0, first: str | None = None) -> Take:
+    """One part of what a person performs: `first` before all else, where the flags do not name kinds."""
     person = FIRST + args.seed
     rng = generator(args.seed, 0xC7, person, part)
     at_first = [first] if first else []

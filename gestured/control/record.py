@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gestured.client.lines import Unreachable, read_ahead
 from gestured.client.program import Commands, on_stop
 from gestured.client.say import say, tell
 from gestured.client.values import number
-from gestured.control.address import add_sockets, connect, finish_after
+from gestured.control.address import add_sockets, connect, finish, finish_after
 from gestured.core.address import Address
 from gestured.record.tape_writer import Writer
 
@@ -46,7 +47,7 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the file full, the daemon gone, or Ctrl-C; 1 where something was lost."""
     with connect(args) as control:
-        on_stop(control.finish)  # what the daemon has said by then still comes
+        on_stop(partial(finish, control))  # what the daemon has said by then still comes
         scene = control.ask("tap")
         with Writer(args.file, scene, args.max_mib << 20) as tape:
             say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ VERDICT_COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "misse
 BOLD, DIM = 1, 2
 UP, CLEAR_BELOW = "\x1b[{}F", "\x1b[J"
 HIDE, SHOW = "\x1b[?25l", "\x1b[?25h"  # the cursor
+STOPWATCH_S = 1e6  # times below are no dates
 NOISE = 20.0  # times the sensor's noise that are drawn brightest at least, so that noise stays dark
 
 
@@ -29,6 +31,11 @@ def name(performed: Performed | None) -> str:
     if performed is None:
         return "nothing"
     return f"no gesture ({performed.kind.replace('_', ' ')})" if performed.label == NONE else performed.label
+
+
+def clock(t: float) -> str:
+    """When something was, for a person: the time of day of a date, else the seconds on a stopwatch."""
+    return datetime.fromtimestamp(t).strftime("%H:%M:%S.%f")[:-3] if t >= STOPWATCH_S else f"{t:.3f} s"
 
 
 def said_when(decided: float, offset: float) -> str:
@@ -147,7 +154,7 @@ class Felt:
         """The picture with its words."""
         head = shown(f"{view['sensor']}  {view['state']}")
         if view["values"] is None:
-            return [head, "the idle sensor is being learned: leave it untouched for a second"]
+            return [head, "the idle sensor is being learned:", "leave it untouched for a second"]
         values = np.array(view["values"], np.float32).reshape(view["grid"])
         self._full = max(self._full, float(values.max()), NOISE * view["noise"])
         words = ["", head, f"phase     {view['phase'].lower()}", f"activity  {view['activity']:.1f}", ""]

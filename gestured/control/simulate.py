@@ -3,12 +3,14 @@
 import argparse
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
+from gestured.client.lines import read_ahead
 from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
-from gestured.client.values import host_port, sensor_name
+from gestured.client.values import host_port, number, sensor_name
 from gestured.control.play import add_arguments, everyday, frames, takes
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -34,7 +36,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--sensor", type=sensor_name, default="simulated", metavar="NAME", help="its name (default: simulated)"
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: go on)")
+    parser.add_argument("--seconds", type=number(0.001, 1e9), metavar="S", help="end after so long (default: go on)")
     parser.add_argument(
         "--everyday",
         nargs="?",
@@ -53,12 +55,14 @@ def run(args: argparse.Namespace) -> int:
     """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
     if args.everyday and (args.kinds or args.speed):
         raise GesturedError("--everyday: expected neither --kinds nor --speed, a day has its own")
-    sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
+    parts = iter(read_ahead((everyday if args.everyday else takes)(args, args.seconds), 1).get, None)
+    first = next(parts)  # the sensor's time begins once it is made; each further one is made while one is sent
+    sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     try:
-        for start, take in (everyday if args.everyday else takes)(args, args.seconds):
+        for start, take in chain([first], parts):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()

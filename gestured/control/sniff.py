@@ -8,6 +8,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 
 from gestured.client.address import bind_failure
 from gestured.client.control import Control
@@ -15,7 +16,7 @@ from gestured.client.lines import Unreachable
 from gestured.client.program import Commands, on_stop
 from gestured.client.say import say, shown, tell
 from gestured.client.values import host_port, number
-from gestured.control.address import add_sockets, connect, finish_after
+from gestured.control.address import add_sockets, connect, finish, finish_after
 from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, propose, split_address
 from gestured.control.sight import Seen, Sight
 from gestured.core.address import Address
@@ -54,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
                 sight.packet(t, source, packet)
         else:
             with connect(args) as control:
-                on_stop(control.finish)  # what the daemon has said by then still comes
+                on_stop(partial(finish, control))  # what the daemon has said by then still comes
                 told = overhear(control, args.seconds, sight)
     except KeyboardInterrupt:
         pass

@@ -110,7 +110,7 @@ class Banks:
         `sources` are those of all packets. `others`: sensors of other packets, which must not be overtaken.
         """
         left: dict[int, tuple[Block, int]] = {}
-        names, arrived = set[str](), list[str]()
+        names, arrived = set[str](), dict[int, list[str]]()  # by how many frames were lost just before
         for block in blocks:
             others = others.union(names.intersection(block.sensors))
             names.update(block.sensors)
@@ -118,14 +118,14 @@ class Banks:
             waits = np.ones(len(block.packets), np.bool_)
             for bank in self._banks.values():
                 try:
-                    for taken in bank.take(block, sources, others, self.doubted, now):
-                        arrived += map(block.sensors.__getitem__, taken)
+                    for taken, lost in bank.take(block, sources, others, self.doubted, now):
+                        for n, before in zip(taken, lost, strict=True):
+                            arrived.setdefault(before, []).append(block.sensors[n])
                         waits[taken] = False
                 except Exception as error:  # a bug: what was not taken until then is taken one by one
                     facts.append(Fault(None, error))
             left |= {block.packets[n]: (block, n) for n in waits.nonzero()[0].tolist()}
-        if arrived:
-            facts.append(Arrived(tuple(arrived), 1, 0, 0, 0, 0))
+        facts += [Arrived(tuple(each), 1, lost, 0, 0, 0) for lost, each in arrived.items()]
         return left
 
 
@@ -239,8 +239,11 @@ class Bank:
 
     def take(
         self, block: Block, sources: Sequence[Source], others: set[str], doubted: set[str], now: float
-    ) -> Iterator[list[int]]:
-        """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
+    ) -> Iterator[tuple[list[int], list[int]]]:
+        """Take those frames of a block that are idle.
+
+        Gives of those that are taken together at a time their places in it, and how many frames were lost just before.
+        """
         if block.values.shape[1:] != self._front.grid_sent:
             return
         owners, sent = map(self._owners.get, block.sensors), map(sources.__getitem__, block.packets)
@@ -263,11 +266,15 @@ class Bank:
             first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
             turn = first[first >= 0]
             doubts = np.array([block.sensors[n] in doubted for n in turn.tolist()]) if doubted else None
-            taken = turn[self._take(block, turn, rows[turn], doubts, now)]
+            lost = self._take(block, turn, rows[turn], doubts, now)
+            taken, lost = turn[lost >= 0], lost[lost >= 0]
+            for n in (lost > 0).nonzero()[0].tolist():  # as `Sensor.receive` counts them
+                sensor = self._sensors[block.sensors[taken[n]]]
+                sensor._lost, sensor._lost_at = sensor._lost + int(lost[n]), now
             for name in doubted.intersection(map(block.sensors.__getitem__, taken.tolist())) if doubted else ():
                 doubted.remove(name)
                 self._sensors[name].vitals.stretches = 0  # see `Vitals.arrived`
-            yield taken.tolist()
+            yield taken.tolist(), lost.tolist()
             left = left[first[rows[left]] != left]
             if len(left):
                 first.fill(-1)
@@ -276,10 +283,11 @@ class Bank:
 
     def _take(
         self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], doubts: Mask | None, now: float
-    ) -> Mask:
-        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did.
+    ) -> NDArray[np.intp]:
+        """Take a frame of each of n rows where it is idle and no earlier one; (n,) how many were lost just before it.
 
-        `doubts`: (n,) before which of them others may have been lost; None before none.
+        That is -1 where it was not taken. What was lost of an idle sensor changes nothing but counts and intervals.
+        `doubts`: (n,) before which of them others may have been lost on this machine; None before none.
         """
         front, known = self._front, _numbers(self._known).take(rows, axis=0)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
@@ -290,12 +298,17 @@ class Bank:
             since = tags - tag
             t = last + since
             taken = (since > 0) & (since <= Stamper.MAX_STEP_S) & (t <= now + Stamper.AHEAD_S)
-        tag[:], counter[:] = tags, counter + 1
-        taken &= np.isnan(counter) if block.counters is None else counter == block.counters[places]
-        since = t - last
+        tag[:], since, lost = tags, t - last, np.zeros(len(rows), np.intp)
+        if block.counters is None:
+            taken &= np.isnan(counter)
+            if doubts is not None:  # what fits into the pause is lost, see `Stamper.stamp`
+                lost[doubts] = np.maximum(np.rint(since / self._usual(rows, count))[doubts] - 1, 0)
+            steps = np.ones(len(rows))
+        else:  # see `Stamper._count`
+            steps = (block.counters[places] - counter + 2**31) % 2**32 - 2**31
+            taken &= (steps >= 1) & (steps <= Stamper.LEAP)
+            counter[:], lost[taken] = block.counters[places], steps[taken] - 1
         taken &= (since >= self._least_s) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
-        if doubts is not None and block.counters is None:  # what fits into the pause is lost, see `Stamper.stamp`
-            taken &= ~doubts | (np.rint(since / self._usual(rows, count)) <= 1)
         sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
         raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.grid_sent))
 
@@ -350,11 +363,12 @@ class Bank:
         keep = slice(None) if taken.all() else taken
         rows, slot = rows[keep], count[keep].astype(np.intp)
         self._above[rows, slot % self._above.shape[1]] = above[keep]
-        self._when[rows, slot % self._when.shape[1]] = np.array((t, new, since)).T[keep]
+        self._when[rows, slot % self._when.shape[1]] = np.array((t, new, since / np.maximum(steps, 1))).T[keep]
         self._taxels[COUNTS][rows], self._taxels[SENT][rows] = counts[keep], sent[keep]
         count += 1
         _numbers(self._known)[rows] = known[keep]
-        return taken
+        lost[~taken] = -1
+        return lost
 
     def _usual(self, rows: NDArray[np.intp], count: Array) -> Array:
         """(n,) s, the usual interval of n rows, of which so many frames were taken here; see `Stamper`."""

@@ -30,6 +30,7 @@ class Datagram(NamedTuple):
     arrival: float  # s, monotonic
     packet: bytes
     source: Source
+    cost: float  # s of work, probably; no more than a sender can save up, so that anybody is served in the end
 
 
 class Group(NamedTuple):
@@ -66,6 +67,11 @@ class Backlog:
 
     def __bool__(self) -> bool:
         return bool(self._packets)
+
+    @property
+    def reads(self) -> float:
+        """How many groups of the largest size would hold what waits."""
+        return max(len(self._packets) / GROUP, self._bytes / GROUP_BYTES)
 
     @property
     def oldest(self) -> float:
@@ -119,14 +125,17 @@ class Backlog:
         """
         by_sender: dict[Sender, list[Datagram]] = {}
         for (packet, source), arrival in zip(self._packets, self._arrivals, strict=True):
-            by_sender.setdefault(self.sender(source), []).append(Datagram(arrival, packet, source))
+            key = self.sender(source)
+            cost = min(len(packet) * self._cost.get(key, FIRST_GUESS), CREDIT_S)
+            by_sender.setdefault(key, []).append(Datagram(arrival, packet, source, cost))
         self._packets, self._arrivals = [], []
         self._bytes = 0
-        needs: dict[Sender, float] = {key: sum(map(self._guess, waiting)) for key, waiting in by_sender.items()}
+        needs: dict[Sender, float] = {key: sum([each.cost for each in waiting]) for key, waiting in by_sender.items()}
         owners: dict[Sender, float] = {key: need for key, need in needs.items() if isinstance(key, tuple)}
-        shares = fair(owners, OWNERS_SHARE * seconds)
+        strangers = {key: need for key, need in needs.items() if key not in owners}
+        shares = fair(owners, max(OWNERS_SHARE * seconds, seconds - sum(strangers.values())))
         spent = sum(min(shares[key], need) for key, need in owners.items())
-        shares |= fair({key: need for key, need in needs.items() if key not in owners}, seconds - spent)
+        shares |= fair(strangers, seconds - spent)
         before = self._equal
         self._equal += min((shares[key] for key in owners), default=OWNERS_SHARE * seconds)
         self._turns = min(self._turns + seconds, CREDIT_S)
@@ -153,10 +162,6 @@ class Backlog:
         """As whom a source counts: for itself where it owns a sensor, else as its host."""
         return source if self._owns(source) else source[0]
 
-    def _guess(self, datagram: Datagram) -> float:
-        guess = len(datagram.packet) * self._cost.get(self.sender(datagram.source), FIRST_GUESS)
-        return min(guess, CREDIT_S)  # no more than a sender can save up, so that anybody is served in the end
-
     def _newest(
         self, key: Sender, datagrams: list[Datagram], share: float, before: float, seconds: float
     ) -> list[Datagram]:
@@ -166,7 +171,7 @@ class Backlog:
         credit = min(credit + share, max(share, CREDIT_S))
         kept: list[Datagram] = []
         for datagram in reversed(datagrams):
-            cost = self._guess(datagram)
+            cost = datagram.cost
             if cost > credit or (cost > seconds and cost > self._turns):
                 break
             credit -= cost
@@ -185,7 +190,7 @@ def _groups(sender: Sender, datagrams: Sequence[Datagram]) -> list[Group]:
         if not groups or datagram.arrival - groups[-1][0].arrival >= TOGETHER_S:
             groups.append([])
         groups[-1].append(datagram)
-    return [Group(sender, [(packet, source) for _, packet, source in some], some[-1].arrival) for some in groups]
+    return [Group(sender, [(packet, source) for _, packet, source, _ in some], some[-1].arrival) for some in groups]
 
 
 def fair(needs: dict[Sender, float], seconds: float) -> dict[Sender, float]:

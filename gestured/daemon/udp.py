@@ -25,7 +25,10 @@ from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
 SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
-FLOOD_SLICE_S = 0.001  # of work on waiting packets in a flood, which fills the kernel's buffer while we work
+# Of work on waiting packets in a flood, at least and at most. The kernel's buffer fills meanwhile, but packets that are
+# served together cost a fraction: where a read finds less than ROOM of the most that it takes, work goes on until half
+# of ROOM has come again.
+FLOOD_SLICE_S, ROOM = (0.001, 0.01), 0.4
 TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
 DRAIN_S = 0.25  # for serving what still waits when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick, since waking for each is much of its price
@@ -65,6 +68,7 @@ class Receiver:
         self._drops = 0  # packets that the kernel had dropped at the last look
         self._dropping = -FLOOD_S  # s, when the kernel began to drop packets
         self._looked = 0.0  # s, when we last looked whether something waits
+        self._shared = 0.0  # s, when we last shared out work in a flood
         self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
@@ -187,7 +191,10 @@ class Receiver:
         self._backlog.worked(time.thread_time() - before, self._clock())
 
     def _work_fairly(self, now: float) -> None:
-        served, dropped = self._backlog.share(FLOOD_SLICE_S, now)
+        least, most = FLOOD_SLICE_S
+        reads, since, self._shared = self._backlog.reads, now - self._shared, now
+        again = since * ROOM / 2 / reads if reads < ROOM else least
+        served, dropped = self._backlog.share(min(max(again, least), most), now)
         start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
         for n, group in enumerate(served):
             if before > start + TURN_S:

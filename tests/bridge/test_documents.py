@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -111,13 +112,16 @@ def test_doctor_says_how_bridges_are(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "bad     gestured-serial@glove.service is failed\n        -> journalctl --unit gestured-serial@glove" in said
 
 
-def test_systemd_is_told_how_a_bridge_is(bridge, broker, daemon: Daemon, tmp_path: Path):
+@pytest.mark.parametrize("there", [True, False])
+def test_systemd_is_told_how_a_bridge_is(bridge, broker, daemon: Daemon, tmp_path: Path, there: bool):
+    path = daemon.socket if there else tmp_path / "none.sock"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         systemd.settimeout(30)
-        begin(bridge, broker(), daemon, env={"NOTIFY_SOCKET": str(tmp_path / "notify")})
+        begin(bridge, broker(), SimpleNamespace(socket=path), env={"NOTIFY_SOCKET": str(tmp_path / "notify")})
         words = ""
         while "daemon" not in words or "broker" not in words:
             words = systemd.recv(4096).decode()
             assert words.startswith("READY=1\nSTATUS=")
-        assert words.partition("STATUS=")[2].startswith("connected: ")
+        assert words.partition("STATUS=")[2].startswith("connected: " if there else "waiting: ")
+        assert there or f"no daemon on {path}; waiting for it" in words

@@ -4,6 +4,7 @@ import json
 import os
 import queue
 import re
+import select
 import shutil
 import signal
 import socket
@@ -46,14 +47,15 @@ MAD = (  # what no daemon says
 
 
 class Listener:
-    """A subscriber of its own make, with MQTT 5."""
+    """A client of its own make, with MQTT 5."""
 
-    def __init__(self, port: int, *topics: str) -> None:
+    def __init__(self, port: int, *topics: str, login: tuple[str | None, str | None] = (None, None)) -> None:
         self._messages: queue.Queue[Any] = queue.Queue()
         subscribed: queue.Queue[bool] = queue.Queue()
         self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
         self.client.on_message = lambda _, __, message: self._messages.put(message)
         self.client.on_subscribe = lambda *_: subscribed.put(True)
+        self.client.username_pw_set(*login)
         self.client.connect("127.0.0.1", port)
         self.client.loop_start()
         for topic in topics:
@@ -346,6 +348,41 @@ def test_a_broker_is_told_to_send_no_large_message(bridge, fake):
             assert b"\x27" + (65536).to_bytes(4, "big") in connection.recv(65536)  # Maximum Packet Size (3.1.2.11.4)
 
 
+def published(data: bytes) -> Iterator[tuple[bytes, str]]:
+    """Number and topic of each message that a client has published, with QoS 1."""
+    while data:
+        length, size, shift = 0, 1, 0
+        while True:  # 1.5.5, seven bits a byte
+            length, shift = length | (data[size] & 127) << shift, shift + 7
+            size += 1
+            if data[size - 1] < 128:
+                break
+        packet, data = data[size : size + length], data[size + length :]
+        end = 2 + int.from_bytes(packet[:2], "big")
+        yield packet[end : end + 2], packet[2:end].decode()
+
+
+def test_a_broker_gets_no_more_messages_at_a_time_than_it_asks_for(bridge, fake):
+    """It may end the connection of who sends more (Receive Maximum, 3.2.2.3.3)."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        bridge("mqtt", "--broker", f"127.0.0.1:{server.getsockname()[1]}", "--socket", fake.path)
+        with server.accept()[0] as connection:
+            connection.settimeout(DEADLINE_S)
+            assert connection.recv(65536).startswith(b"\x10")  # CONNECT
+            connection.sendall(b"\x20\x06\x00\x00\x03\x21\x00\x03")  # CONNACK: three
+            fake.accept()
+            events, waiting = 0, list[bytes]()
+            while events < 20:
+                fake.say(STATUS, *(gesture(n) for n in range(10)))
+                while select.select([connection], [], [], 0.05)[0]:
+                    for number, topic in published(connection.recv(65536)):
+                        waiting.append(number)
+                        events += topic.endswith("/armrest/gesture")
+                assert len(waiting) <= 3
+                connection.sendall(b"\x40\x02" + waiting.pop(0))  # PUBACK
+
+
 def test_a_broker_that_sends_what_cannot_be_read_is_called_again(bridge, fake):
     """Whatever the library's thread dies of: else the bridge would believe for ever that the broker is there."""
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -465,7 +502,13 @@ def test_a_certificate_of_somebody_else_is_refused(bridge, broker, fake, certifi
 def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, certificates: Path):
     at = broker(*tls(certificates), "user root")
     process = begin(bridge, at, fake)
-    assert at.address in process.until("trying again")
+    assert f"{at.address} is not there: it closed the connection" in process.until("is it one with TLS: --tls?")
+
+
+def test_a_broker_that_wants_a_certificate_says_so(bridge, broker, fake, certificates: Path):
+    at = broker(*tls(certificates), f"cafile {certificates}/ca.pem", "require_certificate true", "user root")
+    process = begin(bridge, at, fake, "--tls", "--ca", certificates / "ca.pem")
+    process.until("does it ask for a --cert that it knows?")
 
 
 def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, fake, tmp_path: Path):
@@ -488,6 +531,7 @@ def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, f
         (["--broker", "a b"], "expected HOST:PORT"),
         (["--broker", "localhost", "--ca", "x.pem"], "add --tls"),
         (["--broker", "localhost", "--tls", "--ca", "/none.pem"], "/none.pem"),
+        (["--broker", "localhost", "--tls", "--ca", "/etc/ssl/certs"], "--ca /etc/ssl/certs: there is no such file"),
         (["--broker", "localhost", "--types", "gestures"], "--types"),
         (["--broker", "localhost", "--discovery", "home/#"], '--discovery "home/#": expected the beginning of a topic'),
         (["--broker", "localhost", "--discovery", "+"], '--discovery "+": expected the beginning of a topic'),

@@ -267,6 +267,8 @@ def test_nobody_who_listens_is_said_and_heals(bridge, line):
         ("/dev/null", ["--sensor", "a/b"], "argument --sensor: 'a/b'"),
         ("/dev/null", ["--protocol", "e256", "--grid", "8x8"], "16x16"),
         ("/dev/null", ["--grid", "1x1"], "ROWSxCOLUMNS"),
+        ("/dev/null", ["--baud", "0"], "argument --baud: '0': expected"),
+        ("/dev/null", ["--baud", "5000000000"], "argument --baud: '5000000000': expected"),
         ("/dev/null", ["--to", "nowhere.invalid:9000"], "cannot send to nowhere.invalid:9000"),
     ],
 )

@@ -386,3 +386,12 @@ def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
 def test_bad_input_is_one_sentence(refused, tmp_path, flags, words):
     said = refused("zenoh", "--socket", tmp_path / "none.sock", *flags)
     assert words in said and "Traceback" not in said
+
+
+def test_of_a_file_and_an_endpoint_the_wrong_one_is_named(refused, tmp_path):
+    config = tmp_path / "zenoh.json5"
+    config.write_text("{}")
+    assert "gestured-bridge: --connect: " in refused("zenoh", "--config", config, "--connect", "rubbish")
+    config.write_text('{mode: "x"}')
+    said = refused("zenoh", "--config", config)
+    assert f"--config {config}: " in said and "an endpoint is" not in said

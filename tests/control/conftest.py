@@ -18,7 +18,6 @@ from typing import Any
 
 import pytest
 
-from gestured.client.control import Control
 from gestured.control.cli import main
 from tests.control.browser import PROGRAM, Browser
 from tests.control.pages import Page, viewing
@@ -138,12 +137,6 @@ def sniffed(start: Start) -> Callable[..., tuple[int, bytes, bytes]]:
         return process.returncode, out, err
 
     return sniff
-
-
-def asked(daemon: Daemon) -> dict[str, Any]:
-    """What a daemon answers to `status`."""
-    with Control(Path(daemon.ready["control"])) as control:
-        return control.ask("status")
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from typing import NoReturn
 
 import pytest
 
@@ -38,7 +39,8 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: lis
 @pytest.mark.parametrize(
     ("command", "flag", "value"),
     [
-        ("demo", "--seconds", "0"), ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
+        ("demo", "--seconds", "0"), ("simulate", "--seconds", "nan"), ("simulate", "--seconds", "-5"),
+         ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
         ("enrol", "--examples", "many"),
         ("listen", "--types", "gestures"), ("listen", "--types", ""), ("listen", "--count", "one"),
         ("listen", "--count", "0"),
@@ -48,13 +50,22 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: lis
         ("sniff", "--listen", f"{'a' * 64}:9000"), ("pad", "--listen", ".:9000"), ("simulate", "--sensor", "a/b"),
         ("simulate", "--kinds", "semaphore"), ("simulate", "--seed", "-1"), ("simulate", "--rate", "4"),
         ("simulate", "--rate", "nan"), ("simulate", "--blob", "int12"), ("simulate", "--everyday", "moon"),
-        ("sniff", "--seconds", "0"), ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
+        ("sniff", "--seconds", "0"), ("status", "--socket", ""), ("status", "--control", "/"),
+        ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
     ],
 )  # fmt: skip
 def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: str, value: str) -> None:
     status, out, err = run(*command.split(), flag, value)
     assert (status, out) == (2, "")
     assert f"argument {flag}: " in err and value in err
+
+
+def test_ctrl_c_before_it_has_begun_leaves_no_traceback(run, monkeypatch) -> None:
+    def imported(name: str) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gestured.control.cli.import_module", imported)
+    assert run("enrol", "knock", "--sensor", "arm") == (1, "", "")
 
 
 def redirected(where: str, *arguments: str) -> tuple[int, str]:

@@ -5,14 +5,20 @@ import os
 import re
 import signal
 import subprocess
+import threading
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import gestured
 from gestured.client.engine import Engine
+from gestured.client.sensor import Form
+from gestured.control.cli import parser
+from gestured.control.demo import sending
+from gestured.control.play import performance
 from gestured.model.shipped import shipped
 from tests.control.pages import Page
 from tests.sockets import PATIENCE_S
@@ -80,6 +86,21 @@ def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, shallow, 
     assert process.returncode == 0
     assert b"Summary" in out and err == b""
     assert daemons(shallow) == [] and os.listdir(shallow) == []
+
+
+def test_ended_amid_a_packet_it_sends_that_packet_first(monkeypatch, udp) -> None:
+    amid, packet = threading.Event(), Form.packet
+
+    def slowly(*arguments: Any) -> bytes:
+        amid.set()
+        time.sleep(0.1)
+        return packet(*arguments)
+
+    monkeypatch.setattr(Form, "packet", slowly)
+    args = parser(["demo"]).parse_args(["demo"])
+    with sending(udp.getsockname(), performance(args, 5.0)):
+        assert amid.wait(PATIENCE_S)
+    assert b"/demo/pressure" in udp.recv(65536)
 
 
 def test_killed_outright_it_leaves_no_daemon_running(start, shallow):

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from gestured.client.say import MOST, shown
 from gestured.control.proposal import propose
-from gestured.control.sight import Sight
 from gestured.core.address import is_sensor
 from gestured.core.wire import Addresses
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import ROOT, gestures
+from tests.control.test_sniff import seen
 from tests.daemon.harness import Hand, floats
 from tests.sockets import GESTURE, HELLO, FakeDaemon
 
@@ -87,11 +87,7 @@ def test_only_one_module_prints() -> None:
 
 
 def sniffed(*addresses: str) -> list[str]:
-    sight = Sight()
-    for n in range(3):
-        for address in addresses:
-            sight.packet(n / 15, "127.0.0.1:5", raw(address, n))
-    return propose(sight.rows())
+    return propose(seen(raw(address, n) for n in range(3) for address in addresses).rows())
 
 
 def raw(address: str, n: int = 0) -> bytes:

@@ -7,10 +7,8 @@ from typing import Any
 
 import pytest
 
-from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.listening import MOST_GATES
-from tests.control.conftest import asked
 from tests.daemon.harness import Daemon, Sensor
 
 Ctl = Callable[..., tuple[int, str, str]]
@@ -21,14 +19,13 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "arming.md").read_tex
 def _open(daemon: Daemon) -> Any:
     """No test leaves a gate closed."""
     yield
-    with Control(Path(daemon.ready["control"])) as control:
-        status = control.ask("status")
-        for gate in {*status["gates"], *(gate for sensor in status["sensors"].values() for gate in sensor["closed"])}:
-            control.ask("allow", gate=gate)
+    status = daemon.ask("status")
+    for gate in {*status["gates"], *(gate for sensor in status["sensors"].values() for gate in sensor["closed"])}:
+        daemon.ask("allow", gate=gate)
 
 
 def closed(daemon: Daemon) -> dict[str, list[str]]:
-    return {name: sensor["closed"] for name, sensor in asked(daemon)["sensors"].items() if sensor["closed"]}
+    return {name: sensor["closed"] for name, sensor in daemon.ask("status")["sensors"].items() if sensor["closed"]}
 
 
 def test_a_gate_is_closed_and_opened_while_the_daemon_runs(ctl: Ctl, daemon: Daemon) -> None:
@@ -67,22 +64,21 @@ def test_a_gate_is_closed_and_opened_while_the_daemon_runs(ctl: Ctl, daemon: Dae
 def test_what_cannot_be_is_one_sentence(ctl: Ctl, daemon: Daemon, arguments: tuple[str, ...], words: str) -> None:
     status, out, err = ctl(*arguments)
     assert status == 1 and words in err and err.count("\n") == 1 and not out
-    assert "door" not in asked(daemon)["gates"]
+    assert "door" not in daemon.ask("status")["gates"]
 
 
 def test_there_are_so_many_gates_at_most(daemon: Daemon) -> None:
-    with Control(Path(daemon.ready["control"])) as control:
-        for n in range(MOST_GATES):
-            control.ask("inhibit", gate=f"gate{n}")
-        control.ask("inhibit", gate="gate0", seconds=60)  # it is closed already
-        with pytest.raises(Refused, match="16 gates are closed already"):
-            control.ask("inhibit", gate="one-more")
-    assert len(asked(daemon)["gates"]) == MOST_GATES
+    for n in range(MOST_GATES):
+        daemon.ask("inhibit", gate=f"gate{n}")
+    daemon.ask("inhibit", gate="gate0", seconds=60)  # it is closed already
+    with pytest.raises(Refused, match="16 gates are closed already"):
+        daemon.ask("inhibit", gate="one-more")
+    assert len(daemon.ask("status")["gates"]) == MOST_GATES
 
 
 def test_who_is_silent_is_enrolled_nothing(ctl: Ctl, daemon: Daemon) -> None:
     Sensor(daemon, "leg").begin()
-    while "leg" not in asked(daemon)["sensors"]:
+    while "leg" not in daemon.ask("status")["sensors"]:
         pass
     ctl("inhibit", "leg", "--gate", "door")
     status, _, err = ctl("enrol", "knock", "--sensor", "leg")

@@ -123,12 +123,6 @@ def test_ctrl_c_and_a_reader_that_leaves_end_it_without_a_word(start, fake: Fake
         assert b"Traceback" not in process.stderr.read()
 
 
-def test_a_gesture_that_the_daemon_does_not_know_is_said(listen) -> None:
-    status, _, err = listen([], "--gesture", "swipeleft")
-    assert "no gesture of this daemon: swipeleft (one_tap)" in err
-    assert status == 1 and "closed the connection" in err
-
-
 def test_the_wrong_one_of_two_sockets_is_said(daemon, run, monkeypatch):
     status, _, err = run("emit", "swipe_left", "--control", daemon.socket)
     assert status == 1 and f"{daemon.socket} is not the control socket" in err

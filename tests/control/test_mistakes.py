@@ -12,7 +12,6 @@ import pytest
 
 from gestured.control.findings import RECENT_S, examine_status
 from tests import encoding
-from tests.control.conftest import asked
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted, floats
 from tests.sockets import free_address
 from tests.swipes import swipes
@@ -67,7 +66,7 @@ def awaited(daemon: Daemon, name: str, *states: str) -> dict[str, Any]:
     """A sensor's part of the status, once its state is one of these."""
     end = time.monotonic() + DEADLINE_S
     while True:
-        found: dict[str, Any] = asked(daemon)["sensors"].get(name, {})
+        found: dict[str, Any] = daemon.ask("status")["sensors"].get(name, {})
         if found.get("state") in states:
             return found
         assert time.monotonic() < end, found
@@ -99,7 +98,7 @@ def test_a_sensor_that_sends_only_while_it_is_touched(run, own) -> None:
     for n in range(3):
         sensor.count = 100 * n  # it counts on while it says nothing
         sensor.send(hand.swipe("left"))
-        while asked(daemon)["sensors"].get("arm", {}).get("heard_s_ago", 0.0) < 1.0:
+        while daemon.ask("status")["sensors"].get("arm", {}).get("heard_s_ago", 0.0) < 1.0:
             pass
     sensor.send(hand.swipe("left"))
     awaited(daemon, "arm", "intermittent")
@@ -116,7 +115,7 @@ def test_a_rate_outside_the_range_is_told_with_the_range(ctl, daemon: Daemon, ra
         packet = encoding.bundle([floats(f"/{name}/pressure", hand.frame(), n)], 1.7e9 + n / rate)
         sensor.sock.send(packet)
     awaited(daemon, name, "ok")
-    while abs(asked(daemon)["sensors"][name]["rate_hz"] / rate - 1) > 0.1:
+    while abs(daemon.ask("status")["sensors"][name]["rate_hz"] / rate - 1) > 0.1:
         pass
     found = of(name, ctl("doctor", "--json")[1])
     words = [f for f in found if "5 to 1000 Hz" in f["what"]]
@@ -131,7 +130,7 @@ def test_rows_and_columns_that_are_exchanged(run, own) -> None:
         sensor = Sensor(daemon, name)
         for frame in swipes(12, 6):
             sensor.sock.send(sensor.packet(frame))
-        while asked(daemon)["sensors"].get(name, {}).get("exchanged") is not (name == "wrong"):
+        while daemon.ask("status")["sensors"].get(name, {}).get("exchanged") is not (name == "wrong"):
             pass
     out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
     (remedy,) = [found["remedy"] for found in of("wrong", out) if "rows and columns" in found["what"]]
@@ -163,7 +162,7 @@ def test_what_still_happens_is_a_finding_and_what_is_over_is_none(daemon: Daemon
     Sensor(daemon, name, counted).begin()
     awaited(daemon, name, "ok")
     for seconds, level, words in ((1.0, "warn", "1 s ago"), (RECENT_S + 7200.0, "ok", "2 h 1 min ago")):
-        status = asked(daemon)
+        status = daemon.ask("status")
         last = status["last_s_ago"]
         if kind == "dropped":
             status["input"]["dropped"], last["dropped"] = {"not_osc": many}, {"not_osc": seconds}

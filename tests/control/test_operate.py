@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from gestured.client import address
-from gestured.control.cli import main
 from gestured.control.doctor import _buffer, _clock, _permissions, _port
 from gestured.control.findings import BUFFER_BYTES
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
-from tests.control.conftest import asked
 from tests.daemon.harness import Daemon, Hand, Sensor, floats
 from tests.sockets import FakeDaemon
 
@@ -33,23 +31,14 @@ def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
     assert found["sensors"]["seat"]["gestures"] == 1 and found["ready"]["ready"] is True
 
 
-STATUS = {
-    "version": "1", "state": "degraded", "uptime_s": 7300.0, "pid": 1, "addresses": {"listen": "a:1"},
-    "ready": {"ready": False, "reason": "no model could classify the last segment"},
-    "model": {"active": "lstm", "asked": "cnn_lstm", "degraded": True, "failures": 2, "version": "1",
-              "sha256": "ab"},
-    "sensors": {f"s{i}": {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0,
-                          "grid": "9x9"} for i in range(20)},
-    "answers": {"gestures": {}, "unknown": 3, "cancelled": {"held": 2}}, "recent": [],
-    "input": {"dropped": {"size": 4}, "kernel_drops": 0},
-    "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}},
-    "loop_lag_s": 0.0, "internal_errors": 0,
-    "shift": {"gestures": 40, "outside": {"strength": 0.5, "area": 0.0}, "unlike": ["strength"]},
-}  # fmt: skip
-
-
-def test_status_of_a_daemon_that_is_not_ready_and_shifted() -> None:
-    text = "\n".join(screen(STATUS))
+def test_status_of_a_daemon_that_is_not_ready(daemon: Daemon) -> None:
+    told = daemon.ask("status")
+    silent = {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0, "grid": "9x9"}
+    told |= {"sensors": {f"s{i}": silent for i in range(20)}, "input": {"dropped": {"size": 4}, "kernel_drops": 0}}
+    told["ready"] = {"ready": False, "reason": "no model could classify the last segment"}
+    told["model"] |= {"asked": "cnn_lstm", "degraded": True, "failures": 2}
+    told["answers"]["cancelled"] = {"held": 2}
+    text = "\n".join(screen(told))
     assert "not ready: no model could classify" in text and "a fallback for cnn_lstm, 2 failures" in text
     assert "and 8 more" in text and "4 size" in text and "2 held" in text
 
@@ -62,14 +51,16 @@ def test_status_of_a_daemon_that_is_not_ready_and_shifted() -> None:
          "unlike those of the training in strength (50 %), duration (40 %): gesturectl doctor says more"),
     ],
 )  # fmt: skip
-def test_status_says_one_thing_of_the_shift(shares: dict[str, float], unlike: list[str], words: str) -> None:
+def test_status_says_one_thing_of_the_shift(
+    daemon: Daemon, shares: dict[str, float], unlike: list[str], words: str
+) -> None:
     shift = {"gestures": 40, "outside": shares, "unlike": unlike}
-    (line,) = [line for line in screen(STATUS | {"shift": shift}) if line.startswith("shift:")]
+    (line,) = [line for line in screen(daemon.ask("status") | {"shift": shift}) if line.startswith("shift:")]
     assert line == f"shift: the last 40 gestures are {words}"
 
 
 def test_without_a_daemon_each_says_so_in_one_line(run, tmp_path: Path) -> None:
-    for command in (["status"], ["listen"], ["emit", "one_tap"], ["reload"], ["record", tmp_path / "x.mcap"]):
+    for command in (["status"], ["listen"], ["emit", "one_tap"], ["view"], ["record", tmp_path / "x.mcap"]):
         status, out, err = run(*command, "--control", tmp_path / "none.ctl")
         assert status == 1 and out == "" and err.count("\n") == 1
         assert "no daemon on" in err and "--control" in err
@@ -112,13 +103,13 @@ def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daem
     sensor, hand = Sensor(daemon, "odd"), Hand()
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
         sender.connect(daemon.address)
-        while asked(daemon)["taps"] == 0:
+        while daemon.ask("status")["taps"] == 0:
             pass
         for n in range(20):
             sender.send(floats("/textile/odd/matrix", hand.frame(), n))
         sender.send(b"rubbish!")
     sensor.begin()
-    while asked(daemon)["sensors"].get("odd") is None:
+    while daemon.ask("status")["sensors"].get("odd") is None:
         pass
     sniffer.send_signal(2)
     out, _ = sniffer.communicate(timeout=30)
@@ -134,7 +125,7 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
     client.events("gesture", "hurt")
     sensor.sock.send(floats("/hurt/matrix", Hand().frame(), 0))
     sensor.sock.send(encoding.message("/hurt/pressure", "f" * 25, [0.0] * 25))
-    while not {"address", "size"} <= set(asked(daemon)["input"]["dropped"]):
+    while not {"address", "size"} <= set(daemon.ask("status")["input"]["dropped"]):
         pass
     status, out, err = ctl("doctor", "--json")
     findings = [json.loads(line) for line in out.splitlines()]
@@ -171,7 +162,7 @@ def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -
     sending = threading.Thread(target=send)
     sending.start()
     try:
-        while "size" not in asked(daemon)["input"]["dropped"]:
+        while "size" not in daemon.ask("status")["input"]["dropped"]:
             pass
         out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
     finally:
@@ -184,15 +175,18 @@ def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -
     assert "ROWSxCOLUMNS" not in out
 
 
-def test_a_socket_that_is_not_for_us_names_the_remedy(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_socket_that_is_not_for_us_names_the_remedy(run, monkeypatch: pytest.MonkeyPatch) -> None:
     def connect(self: socket.socket, path: str) -> None:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(socket.socket, "connect", connect)
-    for command in (["status"], ["listen"], ["doctor"]):
-        assert main(command) == 1
-        out, err = capsys.readouterr()
-        assert "Permission denied" in out + err and 'usermod -aG gestured,gestured-events "$USER"' in out + err
+    for command in ("status", "listen", "doctor"):
+        status, out, err = run(command)
+        assert (
+            status == 1
+            and "Permission denied" in out + err
+            and 'usermod -aG gestured,gestured-events "$USER"' in out + err
+        )
 
 
 def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:

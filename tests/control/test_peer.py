@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from gestured.client.subscriber import Subscriber
-from gestured.core.errors import GesturedError
 from tests.sockets import HELLO
 
 OTHER, OPERATOR = 65_533, 65_532  # two accounts that nobody has
@@ -117,13 +115,6 @@ def test_nor_does_it_listen_to_him(run, serve: Serve, seized: Path) -> None:
         assert f"served by uid {OTHER}" in err and "--socket" in err
         assert heard(server) == "nothing"
         (seized / "events.sock").unlink()
-
-
-def test_nor_does_a_subscriber(serve: Serve, seized: Path) -> None:
-    server = serve(seized / "events.sock", json.dumps(HELLO))
-    with pytest.raises(GesturedError, match=f"served by uid {OTHER}"):
-        next(Subscriber(seized / "events.sock"))
-    assert heard(server) == "nothing"
 
 
 def test_a_link_to_a_folder_that_root_gave_him_is_no_better(run, serve: Serve, seized: Path, given: Path) -> None:

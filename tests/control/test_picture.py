@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gestured.client.picture import draw, trace
+from gestured.control.show import Felt
 
 
 def swipe_right(rows: int, columns: int) -> np.ndarray:
@@ -27,6 +28,13 @@ def test_the_end_of_a_stroke_is_the_brightest(grid):
 def test_the_idle_counts_and_their_scale_do_not_show():
     frames = swipe_right(9, 9)
     assert np.allclose(trace(frames), trace((frames - 400.0) * 7 + 90))
+
+
+def test_what_is_drawn_in_place_is_not_wrapped_by_a_narrow_terminal():
+    told = {"sensor": "demo", "state": "starting", "values": None}
+    known = {"values": [0.0] * 81, "grid": [9, 9], "noise": 1.0, "phase": "RELEASING", "activity": 1234.5}
+    for view in (told, told | known):
+        assert max(map(len, Felt(colour=False).lines(view))) <= 40
 
 
 def test_nothing_is_an_empty_picture():

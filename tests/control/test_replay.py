@@ -3,12 +3,12 @@
 import json
 import signal
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gestured.control.cli import main
 from gestured.record import arrays as recording
 from gestured.record import tape_reader
 from gestured.record.recordings import Recordings
@@ -22,14 +22,9 @@ LEAD_S = 1.6  # untouched; 24 frames
 
 
 @pytest.fixture
-def replay(capsys: pytest.CaptureFixture[str]):
+def replay(run):
     """`gesturectl replay`: exit status, standard output, standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        return main(["replay", *map(str, arguments)]), *capsys.readouterr()
-
-    return run
+    return partial(run, "replay")
 
 
 def said(out: str) -> list[str]:
@@ -89,6 +84,7 @@ def test_labels_are_compared_with_what_a_model_says_of_their_recordings(replay, 
     assert [line.split()[1:5] for line in out.splitlines()][:2] == [["101.600", "s", "recording", "1:"]] * 2
     status, out, _ = replay(wrongly, "--model", model, "--diff", "--json")
     assert [json.loads(line)["recorded"]["sensor"] for line in out.splitlines()] == ["recording 1", "recording 2"]
+    assert replay(wrongly, "--model", model)[1].startswith("1.600 s       recording    onset")
     status, out, _ = replay(wrongly, "--model", model, "--sensor", "arm", "--json")
     events = [json.loads(line) for line in out.splitlines()]
     assert {event["sensor"] for event in events} == {"arm"}

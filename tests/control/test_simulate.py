@@ -11,6 +11,7 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 from gestured.client.sensor import Sensor
+from gestured.control.play import takes
 from gestured.simulator import GESTURES
 from gestured.simulator.places import PLACES
 from gestured.simulator.resting import POSTURES
@@ -128,6 +129,31 @@ def test_it_says_in_words_what_is_performed_and_the_same_seed_is_the_same(run, u
     assert np.array_equal(again[1], first[1])
     run(*flags, "--seed", 1)
     assert not np.array_equal(Unpaced.felt[:100], first[1][:100])
+
+
+def test_what_is_made_at_a_time_is_bounded_and_made_before_it_is_to_be_sent(run, unpaced, monkeypatch):
+    made = []
+
+    def parts(*arguments):
+        for part in takes(*arguments):
+            made.append(part[1].frames.size)
+            yield part
+
+    class Slow(Unpaced):
+        def send(self, frames):
+            end = time.monotonic() + 30.0
+            while len(made) < 3 and time.monotonic() < end:  # this one, the next, and one that waits for its place
+                time.sleep(0.01)
+
+    def begins(*arguments):
+        assert made
+        return Slow(*arguments)
+
+    monkeypatch.setattr("gestured.control.play.PART_COUNTS", 50_000)
+    monkeypatch.setattr("gestured.control.simulate.takes", parts)
+    monkeypatch.setattr("gestured.control.simulate.Sensor", begins)
+    assert run("simulate", "--seconds", 120, "--kinds", "one_tap")[0] == 0
+    assert len(made) == 3 and max(made) <= 50_000
 
 
 def test_a_daemon_that_goes_is_said_at_the_end_and_may_come_back(start):

@@ -143,6 +143,12 @@ def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path
     assert status in (0, 1) and "differences" in err
 
 
+def test_two_flags_of_one_second_have_names_of_their_own(ctl, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = [json.loads(ctl("flag", "--json")[1])["file"] for _ in range(2)]
+    assert len(set(told)) == 2 and all(tape_reader.read(file).whole for file in told)
+
+
 def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path: Path) -> None:
     path, _ = recorded(gestures(daemon, "exp", "left", "up"))
     out = tmp_path / "exp.npz"

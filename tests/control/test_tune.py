@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.control.cli import main
 from gestured.control.tune import play
 from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, tune
 from gestured.core.errors import GesturedError
@@ -130,11 +129,8 @@ def recorded(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_labelled_session_gives_a_table_a_picture_and_settings(
-    recorded: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["tune", str(recorded)]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_a_labelled_session_gives_a_table_a_picture_and_settings(run, recorded: Path) -> None:
+    lines = run("tune", recorded)[1].splitlines()
     assert max(map(len, lines)) <= 80
     assert sum(line.lstrip().startswith("0.") for line in lines) == len(THRESHOLDS)
     (told,) = (n for n, line in enumerate(lines) if line.startswith("for the configuration file"))
@@ -146,8 +142,7 @@ def test_a_labelled_session_gives_a_table_a_picture_and_settings(
     else:
         thresholds = {name: table["threshold"] for name, table in pasted["gestures"].items()}
         assert set(thresholds) == set(GESTURES) and set(thresholds.values()) <= set(THRESHOLDS)
-    assert main(["tune", str(recorded), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(run("tune", recorded, "--json")[1])
     rows = found["thresholds"]
     assert [row["threshold"] for row in rows] == list(THRESHOLDS)
     assert all(row["right"] + row["wrong"] + row["missed"] == found["gestures"] for row in rows)
@@ -221,9 +216,7 @@ def test_few_hours_do_not_make_it_say_more(models: dict[bool, Model]) -> None:
     assert tuned.best.threshold == 0.05
 
 
-def test_what_cannot_be_tuned_on_is_one_sentence(
-    recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_tuned_on_is_one_sentence(run, recorded: Path, tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("no recording")
     for arguments, reason in (
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
@@ -233,13 +226,12 @@ def test_what_cannot_be_tuned_on_is_one_sentence(
         ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),
         ([recorded, "--model", "nobody"], "nobody: no shipped model"),
     ):
-        assert main(["tune", *map(str, arguments)]) == 1
-        err = capsys.readouterr().err
-        assert reason in err and err.count("\n") == 1
+        status, _, err = run("tune", *arguments)
+        assert status == 1 and reason in err and err.count("\n") == 1
 
 
 def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_miss_nothing(
-    models: dict[bool, Model], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    run, models: dict[bool, Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     false = 60
 
@@ -253,10 +245,8 @@ def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_m
         tiny_model.make(path, **({"operating_points": POINTS} if has else {}))
 
     def said(has: bool, *more: str) -> tuple[str, dict[str, Any]]:
-        assert main(["tune", "day.mcap", "--model", str(paths[has]), *more]) == 0
-        words = capsys.readouterr().out
-        assert main(["tune", "day.mcap", "--model", str(paths[has]), "--json", *more]) == 0
-        return words, json.loads(capsys.readouterr().out)
+        asked = ("tune", "day.mcap", "--model", paths[has], *more)
+        return run(*asked)[1], json.loads(run(*asked, "--json")[1])
 
     words, found = said(False)
     assert "proposed nothing: nobody performed a gesture" in words and "0.0 %    0.0 %" not in words

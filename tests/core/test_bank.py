@@ -39,9 +39,10 @@ def passed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Of each frame that a bank looks at, whether it takes it."""
     found, take = list[bool](), Bank._take
 
-    def watched(*given: Any) -> NDArray[np.bool_]:
-        found.extend(taken := take(*given))
-        return taken
+    def watched(*given: Any) -> NDArray[np.intp]:
+        lost = take(*given)
+        found.extend((lost >= 0).tolist())
+        return lost
 
     monkeypatch.setattr(Bank, "_take", watched)
     return found
@@ -182,6 +183,31 @@ def test_a_dip_of_a_moment_does_not_keep_sensors_out_of_a_bank(passed: list[bool
         hub.receive([(packet, SOURCE) for packet in packed(PLAIN, values)], k / 15)
         alike.append(passed.count(True))
     assert alike[44] - alike[34] == alike[89] - alike[79] == 10 * EACH
+
+
+def test_idle_frames_are_taken_together_though_others_were_lost_before_them(passed: list[bool]) -> None:
+    """Else each loss would make the next frames dearer, and an overload would last for ever."""
+    rng, hub, names = np.random.default_rng(0), Hub(SCENE, Sure()), [*PLAIN, *(f"clock{n}" for n in range(EACH))]
+    lost = before = 0
+    for k in range(120):
+        packets = [
+            (
+                encoding.bundle(
+                    [encoding.message(f"/{name}/pressure", "i" * ("clock" in name) + "f" * 81, values)], 1e9 + k / 15
+                ),
+                SOURCE,
+            )
+            for name in names
+            if rng.random() < 0.7 or k < 60
+            for values in [[k] * ("clock" in name) + rng.normal(100, 2, 81).tolist()]
+        ]
+        if k == 60:
+            before = len(passed)
+        hub.missed()
+        facts = hub.receive(packets, k / 15)
+        lost += sum(fact.lost * len(fact.sensors) for fact in facts if isinstance(fact, Arrived))
+    assert all(passed[before:]) and len(passed) - before > 0.6 * 60 * len(names)
+    assert lost == sum(reading.lost for reading in hub.readings(8.0).values()) > 0.2 * 60 * len(names)
 
 
 def test_a_sensor_that_sends_is_not_stale_between_two_ticks() -> None:

@@ -306,7 +306,7 @@ at("when").oninput = () => {
   state.moment = last.time + ago;
   plan();
 };
-at("flag").onclick = () => act("flag", { note: at("note").value });
+at("flag").onclick = e => { if (e.detail < 2) act("flag", { note: at("note").value }); }; // a double click is one flag
 at("recalibrate").onclick = () => {
   const question = `Learn the idle sensor ${state.sensor} anew? It must not be touched for a second, and hears nothing meanwhile.`;
   if (confirm(question)) act("recalibrate", { sensor: state.sensor });
@@ -319,6 +319,7 @@ at("gate").onclick = () => {
 };
 addEventListener("resize", plan);
 addEventListener("keydown", e => {
+  if (e.repeat && !e.key.startsWith("Arrow")) return; // a key that is held asks once
   if (e.ctrlKey || e.altKey || e.metaKey || /^(INPUT|SELECT|BUTTON)$/.test(e.target.tagName) && e.target.type !== "checkbox") return;
   const keys = { " ": () => pause(!state.paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), c: () => at("counts").click(), m: () => at("raw").click(), f: () => at("flag").click(), r: () => at("recalibrate").click(), h: () => at("gate").click() };
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
