@@ -34,7 +34,7 @@ class Keeper:
 
     def read(self) -> None:
         """Read the file, and lock it where its folder is there: who enrols nothing needs none."""
-        if self.path is not None and self.path.parent.is_dir():
+        if self.path is not None and os.path.isdir(self.path.parent):  # Path.is_dir raises where we may not look
             try:
                 self.hold()
             except OwnFileError as error:
@@ -42,15 +42,20 @@ class Keeper:
         self.found = own_file.load(self.path, self.found)
 
     def hold(self) -> None:
-        """Lock the file for this daemon. Raises OwnFileError, which names the daemon that holds it, or the fault."""
-        if self._lock is not None:
-            return
+        """Lock the file for this daemon. Raises OwnFileError, which names the daemon that holds it, or the fault.
+
+        A lock that was deleted meanwhile, perhaps with its folder, is made anew.
+        """
         if self.path is None:
             raise OwnFileError(own_file.NO_FILE)
+        place = self.path.with_name(f".{self.path.name}.lock")
         try:
+            if self._lock is not None and os.path.exists(place):
+                return
+            self.close()
             self.path.parent.mkdir(0o700, parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-            lock = open(os.open(self.path.with_name(f".{self.path.name}.lock"), flags, PRIVATE), "r+b", buffering=0)
+            lock = open(os.open(place, flags, PRIVATE), "r+b", buffering=0)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

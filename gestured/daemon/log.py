@@ -31,7 +31,8 @@ def configure(level: str) -> None:
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             *([] if tty else [structlog.processors.format_exc_info]),
-            structlog.dev.ConsoleRenderer() if tty else structlog.processors.JSONRenderer(),
+            # Texts are escaped as in Python: a name that an operator sends must not act on the terminal.
+            structlog.dev.ConsoleRenderer(repr_native_str=True) if tty else structlog.processors.JSONRenderer(),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(level),
         logger_factory=lambda *_: _Printer(),

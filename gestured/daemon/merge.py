@@ -37,7 +37,7 @@ def _from_file(path: str) -> dict[str, Any]:
     except OSError as error:
         limit = f"{MAX_CONFIG_BYTES >> 20} MiB"
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # bad bytes, syntax, or a number of thousands of digits
         raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
     for name in TITLES.keys() & found.keys():  # our own name for tables, no key of the file's
         raise SettingsError(f"{name} ({path}): unknown key, expected [{TITLES[name]}]")

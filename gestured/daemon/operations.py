@@ -10,6 +10,7 @@ from gestured.core.beside.reading import Reading
 from gestured.core.events import Event, Gesture, Onset, Place, Provisional, Release, Where
 from gestured.core.own import to_dict
 from gestured.core.where import zone_at
+from gestured.daemon.own import silent
 from gestured.daemon.parts import Parts
 from gestured.daemon.request import Connection, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.status import status
@@ -108,9 +109,9 @@ class Operations:
     async def enrol(self, connection: Connection, name: str, sensor: SensorName, examples: int = 3) -> Reply:
         """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
         await self._parts.own.writable()
-        silent = self._heard(sensor)[sensor].gate
-        if silent is not None and silent.closed:
-            raise Refusal(f"{sensor} is silent, since gates are closed: {', '.join(silent.closed)}; allow them first")
+        gate = self._heard(sensor)[sensor].gate
+        if gate is not None and gate.closed:
+            raise Refusal(silent(sensor, gate.closed))
         _not_yet(connection)
         self._parts.own.begin(connection, name, sensor, examples, self._parts.hub.scene.gestures)
         return {"name": name, "sensor": sensor, "examples": examples}

@@ -3,11 +3,12 @@
 import asyncio
 import time
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.core.events import Cancelled
+from gestured.core.events import Cancelled, Unknown
 from gestured.core.facts import Decided, Fact
 from gestured.core.messages import json_line
 from gestured.core.own import EXAMPLES, MOST, Examples, is_name
@@ -22,6 +23,11 @@ from gestured.model.own_file import OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # a contact so cancelled was `Decided`, too, and counts once
+
+
+def silent(sensor: str, gates: Collection[str]) -> str:
+    """Why nothing can be enrolled on a sensor while these gates are closed."""
+    return f"{sensor} is silent, since gates are closed: {', '.join(gates)}; allow them first"
 
 
 class OwnGestures:
@@ -124,21 +130,27 @@ class OwnGestures:
         model = self._ladder.model
         if model.space is None:
             raise Refusal(f"{self.off}: own gestures are off while it answers")
-        judge = Examiner(model, model.space, self._ladder.own, in_use)
-        self._open = Enrolment(name, sensor, examples, judge), connection
+        self._examiner = partial(Examiner, model, model.space, in_use=in_use)
+        self._open = Enrolment(name, sensor, examples, self._examiner(self._ladder.own)), connection
         self._heard = time.monotonic()
         connection.streams = True  # so that it is not ended for asking nothing
 
     def see(self, fact: Fact) -> None:
         """Look at a fact of the hub: each answer of the sensor is an attempt."""
-        if self._open is None or not isinstance(fact, Decided | Cancelled):
+        if self._open is None or not isinstance(fact, Decided | Cancelled | Unknown):
             return
         enrolment, connection = self._open
         if enrolment.complete or fact.sensor != enrolment.sensor:
             return
         if isinstance(fact, Cancelled) and fact.reason == ANSWERED_TWICE:
             return
+        if isinstance(fact, Unknown) and not fact.gates:
+            return  # it was `Decided`, too
         self._heard = time.monotonic()
+        if isinstance(fact, Unknown):
+            reason = silent(fact.sensor, fact.gates)
+            connection.send(json_line({"example": len(enrolment.kept) + 1, "kept": False, "reason": reason}))
+            return
         try:
             told = enrolment.see(fact.segment if isinstance(fact, Decided) else fact)
         except GesturedError as error:  # the model failed
@@ -190,7 +202,10 @@ class OwnGestures:
         async with self.writing:
             ladder = self._ladder
             await asyncio.to_thread(self._keeper.change, change, ladder.model.sha256)
-            self._use(await asyncio.to_thread(ladder.compared, self._keeper.found.gestures))
+            own = await asyncio.to_thread(ladder.compared, self._keeper.found.gestures)
+            self._use(own)
+        if self._open is not None:
+            self._open[0].judge = self._examiner(own)  # what was forgotten speaks against no example any more
         self._changed()
 
     def _check(self, name: str, gestures: Examples) -> None:

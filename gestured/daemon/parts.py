@@ -88,4 +88,5 @@ class Parts:
     def awaiting_restart(self) -> list[str]:
         """Settings that a reload has read, but that a restart alone can put to use."""
         new, old = self.settings, self._started_with
-        return [TITLES.get(key, key) for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
+        changed = [key for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
+        return list(dict.fromkeys(TITLES.get(key, key) for key in changed))

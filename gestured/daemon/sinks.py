@@ -116,24 +116,30 @@ class OscSink(UdpOut):
 
         A test's messages stand in a bundle behind `/gestured/test ,s sensor`; their arguments are the usual ones.
         """
+        message = self._out.message
+        if isinstance(event, Status):
+            heard = sum(state not in SILENT for state in event.sensors.values())
+            self.send(message("/gestured/status", "si", (event.state, heard)).dgram)
+            return
         if isinstance(event, Gesture | Unknown | Cancelled):
             self._judge(event)
+        told = []
         if isinstance(event, Provisional) and self.wants:
             self._said[event.sensor] = event
             said = (event.gesture, event.confidence, event.id)
-            self.send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)
+            told.append(message(f"/gestured/{event.sensor}/provisional", "sfi", said))
         elif isinstance(event, Gesture):
             args = (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch)
-            messages = [self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)]
+            told.append(message(f"/gestured/{event.sensor}/gesture", "sfidd", args))
             if (at := event.where) is not None:
                 place = (event.sequence, at.start.x, at.start.y, at.end.x, at.end.y, at.way, at.pressure, at.contacts)
-                messages.append(self._out.message(f"/gestured/{event.sensor}/where", "iffffffi", place))
-            mark = self._out.message("/gestured/test", "s", (event.sensor,))
-            for packet in [self._out.bundle(mark, *messages)] if test else messages:
-                self.send(packet.dgram)
-        elif isinstance(event, Status):
-            heard = sum(state not in SILENT for state in event.sensors.values())
-            self.send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
+                told.append(message(f"/gestured/{event.sensor}/where", "iffffffi", place))
+        if test and told:
+            mark = message("/gestured/test", "s", (event.sensor,))
+            self.send(self._out.bundle(mark, *told).dgram)
+        else:
+            for one in told:
+                self.send(one.dgram)
 
     def take_over(self, before: UdpOut) -> None:
         """Revoke what the one before has said, where that turns out wrong."""

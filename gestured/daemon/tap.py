@@ -15,6 +15,7 @@ from itertools import islice
 
 from gestured.core import messages
 from gestured.core.events import Event, Status, Touch
+from gestured.core.hub import REMEMBERED
 from gestured.core.messages import json_line
 from gestured.core.owner import Source
 from gestured.daemon.request import Connection
@@ -39,7 +40,8 @@ class Taps:
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
         self.held_bytes = 0  # in the ring
         self._epoch_ns = 0  # of the live taps
-        self._gates: dict[str, bytes] = {}  # by sensor: the line that said what it listened to where the ring begins
+        # By sensor, the latest last: the line that said what it listened to where the ring begins.
+        self._gates: dict[str, bytes] = {}
 
     @property
     def active(self) -> bool:
@@ -128,7 +130,11 @@ class Taps:
             _, size, what = self._ring.popleft()
             self.held_bytes -= size
             if isinstance(what, bytes) and what.startswith(GATE):
-                self._gates[json.loads(what)["sensor"]] = what
+                sensor = json.loads(what)["sensor"]
+                self._gates.pop(sensor, None)
+                self._gates[sensor] = what
+                if len(self._gates) > REMEMBERED:  # a peer chooses the names of sensors
+                    del self._gates[next(iter(self._gates))]
 
 
 def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:

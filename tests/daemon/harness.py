@@ -14,7 +14,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +95,7 @@ class Daemon:
         env: dict[str, str] | None = None,
         python: Iterable[str] = (),
         stderr: int | None = None,
+        pass_fds: Collection[int] = (),
     ) -> None:
         """`python` are flags of the interpreter; `stderr` is a descriptor, or by default a file in `folder`."""
         self.folder = folder
@@ -105,7 +106,7 @@ class Daemon:
             self.process = subprocess.Popen(
                 [sys.executable, *python, "-m", "tests.daemon.program", *map(str, flags)],
                 stdout=subprocess.PIPE, stderr=errors if stderr is None else stderr,
-                env=clean | (env or {}), text=True,
+                env=clean | (env or {}), text=True, pass_fds=pass_fds,
             )  # fmt: skip
         self.ready: Line = {}
 

@@ -4,8 +4,6 @@ import json
 import os
 import signal
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -20,20 +18,17 @@ kept = [os.dup2(os.dup(fd), 100 + i) for i, fd in enumerate(fds)]
 for i, fd in enumerate(kept):
     os.dup2(fd, 3 + i)
 os.environ |= {"LISTEN_PID": str(os.getpid()), "LISTEN_FDS": str(len(fds)), "LISTEN_FDNAMES": sys.argv[2]}
-os.execv(sys.executable, [sys.executable, "-m", "gestured.daemon", *sys.argv[3:]])
+os.execv(sys.executable, [sys.executable, *sys.argv[3:]])
 """
 
 
 class Activated(Daemon):
     """A daemon that is given sockets by name."""
 
-    def __init__(self, folder: Path, *flags: object, sockets: dict[str, socket.socket], **more: object) -> None:
+    def __init__(self, folder: Path, *flags: object, sockets: dict[str, socket.socket]) -> None:
         fds = [sock.fileno() for sock in sockets.values()]
-        arguments = [",".join(map(str, fds)), ":".join(sockets), *map(str, flags)]
-        self.folder, self.stderr_path, self.ready = folder, folder / "stderr.txt", {}
-        with self.stderr_path.open("ab") as errors:
-            command = [sys.executable, "-c", ACTIVATE, *arguments]
-            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, pass_fds=fds)
+        activate = ("-c", ACTIVATE, ",".join(map(str, fds)), ":".join(sockets))
+        super().__init__(folder, *flags, python=activate, pass_fds=fds)
 
 
 @pytest.fixture

@@ -12,18 +12,17 @@ from tests.daemon.harness import Daemon, Hand, Sensor
 
 NAN = Hand().frame().ravel()
 NAN[40] = math.nan
+nested = encoding.message("/bad/pressure", "f", (1.0,))
+for _ in range(40):
+    nested = encoding.bundle([nested])
 RUBBISH = {  # what else a packet may be, and by which reason it is refused, tests/core/test_wire.py and test_osc.py say
     "text": (b"GET / HTTP/1.1\r\n\r\n", "not_osc"),
     "not finite": (encoding.message("/bad/pressure", "f" * 81, (NAN,)), "not_finite"),
     "unknown address": (encoding.message("/bad/humidity", "f", (1.0,)), "address"),
     "negative bundle element": (b"#bundle\0" + bytes(7) + b"\1" + struct.pack(">i", -4) + bytes(4), "bundle"),
-    "deep nesting": (b"", "bundle"),
+    "deep nesting": (nested, "bundle"),
     "a whole datagram of zeros": (bytes(60_000), "not_osc"),
 }
-nested = encoding.message("/bad/pressure", "f", (1.0,))
-for _ in range(40):
-    nested = encoding.bundle([nested])
-RUBBISH["deep nesting"] = (nested, "bundle")
 
 
 @pytest.mark.parametrize("name", RUBBISH)

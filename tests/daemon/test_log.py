@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from gestured.client.lines import Refused
 from gestured.daemon import log
 from gestured.daemon import start as start_up
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
@@ -52,6 +53,17 @@ def test_a_daemon_whose_log_is_not_read_serves_and_ends(start, unread: int) -> N
     daemon.signal(signal.SIGTERM)
     assert daemon.wait() == 0
     assert os.get_blocking(unread)  # it is shared with others: whoever started the daemon finds it as it was
+
+
+def test_what_an_operator_sends_does_not_act_on_the_daemons_terminal(start) -> None:
+    ours, theirs = pty.openpty()
+    daemon = start(stderr=theirs)
+    with pytest.raises(Refused, match="no gesture"):
+        daemon.ask("emit", gesture="wink\x1b[2J")
+    assert daemon.stop() == 0
+    os.close(theirs)
+    said = os.read(ours, 1 << 16)
+    assert b"\x1b[2J" not in said and b"wink\\x1b[2J" in said
 
 
 def test_what_is_said_when_the_interpreter_ends_does_not_keep_it() -> None:

@@ -172,6 +172,9 @@ def test_each_example_is_judged_at_once(begin: Begin) -> None:
     sensor.slash()
     line = again.line()
     assert (line["kept"], "the same as slash" in line["reason"]) == (False, True)
+    daemon.ask("forget", name="slash")  # which makes room for it
+    sensor.slash()
+    assert again.line()["kept"] is True and again.line() == {"enrolled": "cut", "examples": 1}
 
 
 def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_path: Path) -> None:
@@ -202,6 +205,19 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
     assert not (tmp_path / "own-gestures.json").exists()
     enrol(daemon, sensor, "cut")
     assert daemon.ask("gestures")["own"]["gestures"] == {"cut": 2}
+
+
+def test_what_is_performed_while_a_gate_is_closed_is_answered_too(begin: Begin) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    enrolment = Enrolment(daemon, "slash", examples=1)
+    daemon.ask("inhibit", gate="door")
+    sensor.slash()
+    reason = "armrest is silent, since gates are closed: door; allow them first"
+    assert enrolment.line() == {"example": 1, "kept": False, "reason": reason}
+    daemon.ask("allow", gate="door")
+    sensor.slash()
+    assert enrolment.line()["kept"] is True and enrolment.line() == {"enrolled": "slash", "examples": 1}
 
 
 def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:
@@ -268,6 +284,7 @@ def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: B
     ("flags", "env", "words"),
     [
         (("--own-gestures", "/proc/own-gestures.json"), {}, r"/proc/own-gestures\.json: cannot be written"),
+        (("--own-gestures", f"/{'a' * 256}/own.json"), {}, r"own\.json: cannot be read: File name too long"),
         ((), {"STATE_DIRECTORY": "", "XDG_STATE_HOME": "", "HOME": ""}, "no home: .*--own-gestures FILE"),
     ],
 )
@@ -292,9 +309,7 @@ def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
     assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"slash"}
 
 
-def test_another_model_takes_the_examples_over_or_says_that_they_are_off(
-    begin: Begin, tmp_path: Path, model: Path
-) -> None:
+def test_another_model_takes_the_examples_over_or_says_that_they_are_off(begin: Begin, model: Path) -> None:
     daemon = begin()
     sensor = ready(daemon)
     enrol(daemon, sensor)

@@ -1,6 +1,7 @@
 """The file of the user's own gestures: what of it is read, and who writes it."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -89,6 +90,15 @@ def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: 
     assert own_file.where(Path("mine.json"), environ) == Path("mine.json")
 
 
+def test_a_folder_into_which_we_may_not_look_is_a_fault_of_the_file(tmp_path: Path, nobody) -> None:
+    """As where a service's account was left the HOME of root."""
+    tmp_path.chmod(0o700)
+    keeper = Keeper(tmp_path / "state" / "own.json")
+    with nobody():
+        keeper.read()
+    assert keeper.fault == f"{keeper.path}: cannot be read: Permission denied"
+
+
 def test_a_folder_is_made_where_something_is_enrolled_and_not_before(tmp_path: Path) -> None:
     path = tmp_path / "state" / "gestured" / "own.json"
     keeper = Keeper(path)
@@ -96,6 +106,11 @@ def test_a_folder_is_made_where_something_is_enrolled_and_not_before(tmp_path: P
     assert not path.parent.parent.exists() and keeper.fault is None
     keeper.change(lambda found: {"slash": (EXAMPLE,)}, "")
     assert path.stat().st_mode & 0o777 == 0o600 and path.parent.stat().st_mode & 0o777 == 0o700
+    shutil.rmtree(path.parent)  # while the daemon runs
+    keeper.change(lambda found: {**found, "cut": (EXAMPLE,)}, "")
+    assert own_file.load(path).gestures.keys() == {"cut"}
+    with pytest.raises(OwnFileError, match="another gestured"):
+        Keeper(path).hold()
 
 
 def test_who_has_let_go_of_a_file_must_lock_it_again(tmp_path: Path) -> None:

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from gestured.core.owner import Source
 from gestured.daemon import udp
+from gestured.daemon.backlog import TOGETHER_S
 from gestured.daemon.health import TICK_S
 from gestured.daemon.mute import Rule
-from gestured.daemon.udp import TIMESTAMP, Receiver
+from gestured.daemon.udp import PAUSE_S, TIMESTAMP, Receiver
 
 START_S = 1000.0
 STOP_S = 1.3
@@ -60,6 +61,8 @@ class Machine:
         self.looks, self.look_s, self.looked_s = False, 0.0, 0.0  # at contacts, for provisional events
         self.asks = 0  # segments that wait for their names, which cost as much
         self.latest_s = 0.0  # that a packet was served after it came
+        self.received = 0  # times that packets were handed on
+        self.moved_s = 0.0  # by which the time that a packet was given differed from when it came
 
     def work(self, seconds: float) -> None:
         """The processor does something for so long."""
@@ -138,8 +141,11 @@ class Machine:
     active = False
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
+        self.received += 1
         for packet, source in packets:
-            self.latest_s = max(self.latest_s, self.now - self.admitted[len(self.served)])
+            came = self.admitted[len(self.served)]
+            self.moved_s = max(self.moved_s, abs(now - came))
+            self.latest_s = max(self.latest_s, self.now - came)
             self.work(self._cost(packet))
             self.served.append((packet, source))
         return []
@@ -189,7 +195,7 @@ def sensors(count: int, frames: int) -> list[Sent]:
 
 @settings(max_examples=50, deadline=None)
 @given(st.sets(st.integers(0, 6000), max_size=4), st.sampled_from([3e-6, 2e-4]))
-def test_all_that_arrived_until_then_was_served_wherever_it_stands_still(stops: set[int], cost_s: float) -> None:
+def test_wherever_it_stands_still_all_that_arrived_is_served_and_no_frame_moves(stops: set[int], cost_s: float) -> None:
     """A stranger's rubbish lies before the frames, more than a read takes, and a stop may begin at any moment."""
     rubbish = [(t + n * 1e-6, b"x" * 100, ("10.0.0.9", 1)) for t in (0.5, 1.5, 2.5) for n in range(1000)]
     machine = Machine([*sensors(4, 60), *rubbish], lambda packet: cost_s, stops)
@@ -202,6 +208,18 @@ def test_all_that_arrived_until_then_was_served_wherever_it_stands_still(stops: 
 
     run(machine, 8.0, look)
     assert len(machine.served) == len(machine.admitted)
+    assert machine.moved_s < TOGETHER_S  # packets that arrived together have one time
+
+
+@pytest.mark.parametrize(("apart_s", "received", "latest_s"), [(1 / 15, 100, 0.0), (0.0004, 25, PAUSE_S)])
+def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
+    apart_s: float, received: int, latest_s: float
+) -> None:
+    """They come in pairs, 0.2 ms from one to the other: two by themselves are not thick."""
+    pairs = [(0.01 + n * apart_s + m * 2e-4, b"x", ("10.0.0.1", 1)) for n in range(50) for m in range(2)]
+    machine = Machine(pairs, lambda packet: 1e-5)
+    run(machine, 5.0)
+    assert len(machine.served) == 100 and machine.received <= received and machine.latest_s < latest_s + 1e-4
 
 
 @pytest.mark.parametrize("ports", [1, 20, 58])

@@ -181,11 +181,6 @@ def test_metrics_count_what_happened(shared: Daemon) -> None:
     assert shared.metric("gestured_active_model_info", model="tiny", version=client.hello["version"]) == 1
     assert shared.metric("gestured_confidence_count") >= 1
     assert shared.metric("gestured_sensors") >= 1 and shared.metric("gestured_model_rung") == 0
-    text = shared.get("/metrics")[1]
-    label = "counting" if 'sensor="counting"' in text else "other"  # only the first few have a name
-    assert f'gestured_frames_total{{result="ok",sensor="{label}"}}' in text
-    assert f'gestured_sensor_rate_hertz{{sensor="{label}"}}' in text
-    assert text.count("\n") - text.count("\n#") < 200
 
 
 def test_the_names_of_metrics_are_an_interface(shared: Daemon) -> None:

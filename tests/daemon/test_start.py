@@ -41,7 +41,9 @@ def test_the_ready_line_says_where_everything_is(start) -> None:
     assert list(daemon.ready) == ["type", "listen", "socket", "metrics", "model", "control"]
     assert daemon.ready["type"] == "ready" and daemon.ready["model"] == "tiny"
     assert not daemon.ready["listen"].endswith(":0") and not daemon.ready["metrics"].endswith(":0")
-    assert stat.S_IMODE(daemon.socket.stat().st_mode) == 0o660
+    assert Path(daemon.ready["control"]) == daemon.socket.with_suffix(".ctl")
+    for path in (daemon.socket, daemon.socket.with_suffix(".ctl")):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o660  # for owner and group
     assert json.loads(daemon.get("/readyz")[1])["ready"] is True
 
 
@@ -197,6 +199,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         (("--own-gestures", "/"), {}, "", ("own_gestures", "'/'", "expected the path of a file")),
         ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
+        ((), {}, f"stale_s = {'1' * 5000}", ("gestured.toml", "TOML", "4300 digits")),
         (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),
     ],
 )
