@@ -60,6 +60,8 @@ def find_socket(environ: Mapping[str, str]) -> Path:
     none.
     """
     if path := setting(environ, "socket"):
+        if not Path(path).name:  # beside which no control socket can be
+            raise SettingsError(f"GESTURED_SOCKET: expected {SOCKET_PATH}, found {path!r}")
         return Path(path)
     # Unlike Path.exists, os.path.exists raises no error where we may not look.
     installed = SYSTEM.parent.is_dir() and not environ.get("RUNTIME_DIRECTORY")

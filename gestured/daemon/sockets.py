@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import bind_failure
+from gestured.client.address import SOCKET_PATH_BYTES, bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
@@ -116,7 +116,8 @@ class UnixListener(Listener):
             self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
             before = os.umask(0o117)  # 0660 from the start, not after a moment
             try:
-                self.sock.bind(str(path))
+                whole = path.absolute()  # the kernel's table shows it, by which `status --all` finds a daemon
+                self.sock.bind(str(whole if len(os.fsencode(whole)) <= SOCKET_PATH_BYTES else path))
             finally:
                 os.umask(before)
             self.sock.listen(BACKLOG)

@@ -35,6 +35,12 @@ def test_what_the_environment_says_comes_first(tmp_path: Path, system: Path):
     assert address.find_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
 
 
+@pytest.mark.parametrize("path", ["/", "."])
+def test_what_the_environment_says_must_have_a_name(path: str):
+    with pytest.raises(SettingsError, match="GESTURED_SOCKET: expected the path"):
+        address.find_control({"GESTURED_SOCKET": path})
+
+
 def test_without_a_session_root_has_the_services_folder_and_others_are_asked_for_a_path(
     system: Path, monkeypatch: pytest.MonkeyPatch
 ):

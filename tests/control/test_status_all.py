@@ -7,6 +7,7 @@ import pytest
 
 from gestured.client import address
 from gestured.control import status as status_command
+from gestured.daemon.sockets import UnixListener
 from tests.daemon.harness import Daemon
 
 
@@ -30,3 +31,16 @@ def test_one_that_does_not_answer_and_none_at_all_are_said(
     installed = fake_control("mad").rename(tmp_path / "events.ctl")
     status, out, _ = run("status", "--all")
     assert status == 1 and f"{installed} " in out and "status: mad" in out
+
+
+@pytest.mark.parametrize(("folder", "whole"), [("a", True), ("a" * 120, False)])
+def test_a_socket_that_was_named_from_a_folder_is_found_from_another(
+    folder: str, whole: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless its whole path is longer than that of a socket may be."""
+    (tmp_path / folder).mkdir()
+    monkeypatch.chdir(tmp_path / folder)
+    listener = UnixListener(Path("events.sock"))
+    assert listener.sock.getsockname() == (str(tmp_path / folder / "events.sock") if whole else "events.sock")
+    listener.close()
+    assert not list((tmp_path / folder).iterdir())
