@@ -116,7 +116,7 @@ def _sensor(sensor: Sensor, words: list[str]) -> Sensor:
         elif key == "jitter":
             sensor = replace(sensor, jitter=_seconds([value], sensor))
         else:
-            sensor = replace(sensor, **{{"rate": "rate"}.get(key, key): float(value)})
+            sensor = replace(sensor, **{key: float(value)})
     return sensor
 
 
@@ -155,7 +155,8 @@ def _step(number: int, text: str, verb: str, rest: str, sensor: Sensor) -> Step:
     raise ValueError(f"unknown verb {verb!r}")
 
 
-_TIMED = ("quiet", "silence", "press", "move", "circle", "drift", "ramp", "rubbish")
+_LASTING = ("quiet", "silence", "press", "move", "circle", "ramp", "rubbish")
+_TIMED = (*_LASTING, "drift")  # which goes on beside what lasts
 
 
 def _fingers(parts: list[list[str]], moving: bool) -> Fingers:
@@ -216,7 +217,10 @@ class Player:
         return self.events
 
     def frames(self, step: Step) -> Iterator[Frame]:
-        """What the sensor sends while one step lasts."""
+        """What the sensor sends while one step lasts; one that does not last changes what it sends from now on."""
+        if step.verb not in _LASTING:
+            self._change(step)
+            return
         sensor = self.scenario.sensor
         begin, end = self._now, self._now + step.seconds
         while (t := (self._frame + self._sampling) / sensor.rate) < end:
@@ -260,7 +264,23 @@ class Player:
         return np.where(self._dead, 0.0, np.maximum(np.rint(shown), 0.0))
 
     def _take(self, step: Step) -> None:
-        words, front_end = step.words, self.front_end
+        if step.verb == "expect":
+            self._expect(step)
+        elif step.verb == "check":
+            for word in step.words:
+                assert self._holds(word, step), self._says(step, f"{word!r} is not so")
+        elif step.verb == "forget":
+            self.events = []
+        elif step.verb == "end":
+            self._note(self.front_end.flush(_exact(self._now)))
+        else:
+            if step.verb == "restart":
+                self._note(self.front_end.reset())
+            for frame in self.frames(step):
+                self._note(contacts(self.front_end, frame))
+
+    def _change(self, step: Step) -> None:
+        words = step.words
         if step.verb == "object":
             self._lying += step.fingers(0.0)
         elif step.verb == "clear":
@@ -281,20 +301,6 @@ class Player:
             self._lose = int(words[0])
         elif step.verb in ("shift", "restart"):
             self._baseline = float(words[0])
-            if step.verb == "restart":
-                self._note(front_end.reset())
-        elif step.verb == "forget":
-            self.events = []
-        elif step.verb == "end":
-            self._note(front_end.flush(_exact(self._now)))
-        elif step.verb == "expect":
-            self._expect(step)
-        elif step.verb == "check":
-            for word in words:
-                assert self._holds(word, step), self._says(step, f"{word!r} is not so")
-        else:
-            for frame in self.frames(step):
-                self._note(contacts(front_end, frame))
 
     def _note(self, events: Sequence[Found]) -> None:
         self.events += events

@@ -14,16 +14,15 @@ import pytest
 from gestured.daemon.explain import explain
 from gestured.daemon.settings import Settings
 from gestured.model.shipped import shipped
+from tests.documents.blocks import ROOT, blocks, documents
 from tests.programs import PARSERS, subcommands
 
-ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text()
-DOCUMENTS = README + "".join(path.read_text() for path in sorted((ROOT / "docs").glob("**/*.md")))
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+DOCUMENTS = "".join(path.read_text() for path in documents())
 
 
-def blocks(language: str) -> list[str]:
-    return [text for found, text in BLOCK.findall(README) if found == language]
+def readme(language: str) -> list[str]:
+    """The README's examples in a language."""
+    return [block.text for block in blocks(document="README.md") if block.language == language]
 
 
 def flags(parser: argparse.ArgumentParser) -> set[str]:
@@ -65,7 +64,7 @@ def test_no_row_describes_a_subcommand_that_is_gone():
 def test_the_subscriber_in_the_readme_prints_gestures(tmp_path: Path):
     import socket
 
-    (code,) = [text for text in blocks("python") if "subscribe" in text]
+    (code,) = [text for text in readme("python") if "subscribe" in text]
     path = tmp_path / "events.sock"
     gesture = {"type": "gesture", "sensor": "armrest", "gesture": "swipe_left", "confidence": 0.9}
     with socket.socket(socket.AF_UNIX) as listener:
@@ -88,7 +87,7 @@ def test_the_sensor_in_the_readme_sends_a_frame():
 
     from pythonosc.osc_message import OscMessage
 
-    (code,) = [text for text in blocks("python") if "pythonosc" in text]
+    (code,) = [text for text in readme("python") if "pythonosc" in text]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(30)
@@ -106,9 +105,9 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
     """
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    lines = [line for line in "".join(blocks("sh")).splitlines() if line.startswith("gesture")]
-    daemon_line, simulate_line, listen_line = lines[0], lines[1], lines[2]
-    (exported,) = re.findall(r"^export (\w+)=(?:\S+)$", "".join(blocks("sh")), re.MULTILINE)
+    typed = "".join(readme("sh"))
+    daemon_line, simulate_line, listen_line, *_ = [x for x in typed.splitlines() if x.startswith("gesture")]
+    (exported,) = re.findall(r"^export (\w+)=(?:\S+)$", typed, re.MULTILINE)
     environment = os.environ | {exported: str(tmp_path / "events.sock")}
     running = []
 
@@ -133,28 +132,28 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
 
 
 def test_the_readme_quotes_the_tables():
-    readme, figures, performance, everyday = (
+    page, figures, performance, everyday = (
         (ROOT / name).read_text()
         for name in ("README.md", "docs/figures.md", "docs/performance.md", "docs/everyday.md")
     )
-    screen = readme.partition("## What it is")[0]
+    screen = page.partition("## What it is")[0]
 
     def cells(text: str, begins: str) -> list[str]:
         line = next(line for line in text.splitlines() if line.startswith(f"| {begins}"))
         return [cell.partition(" (")[0] for cell in line.strip("| ").split(" | ")]  # no intervals
 
-    quoted = re.findall(r"^\| ((?:simulated|another generator|real), .+?) \|", readme, re.MULTILINE)
+    quoted = re.findall(r"^\| ((?:simulated|another generator|real), .+?) \|", page, re.MULTILINE)
     assert len(quoted) == 5
     for field in quoted:
         _, count, _, right, wrong, lost, _, rejected = cells(figures, f"`cnn_lstm.onnx`, {field} ")
-        assert cells(readme, f"{field} ")[1:] == [count, right, wrong, lost, rejected]
+        assert cells(page, f"{field} ")[1:] == [count, right, wrong, lost, rejected]
     _, count, _, right, wrong, *_ = cells(figures, "`cnn_lstm.onnx`, real, taps and swipes")
     assert f"{right} of {count} taps" in screen and f"{wrong} were wrong" in screen
     hours, contacts, false, interval, *_, missed, _ = map(str.strip, cells(everyday, "all ")[1:])
     assert f"{false} false gestures an hour on a simulated day at {100 * float(missed):.1f} % missed" in screen
     assert f"interval {interval}" in screen and f"{hours} people" in screen and f"{contacts} contacts" in screen
     for begins in ("answer decided to event received (p50)", "start to ready"):
-        assert cells(performance, begins)[1] in readme, begins
-    assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in readme
+        assert cells(performance, begins)[1] in page, begins
+    assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in page
     (felt,) = [line for line in explain(Settings(), {}).splitlines() if "is answered" in line]
     assert all(f"{seconds} after" in screen for seconds in re.findall(r"(\S+ s) after", felt))

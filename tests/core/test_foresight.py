@@ -21,6 +21,8 @@ from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from gestured.model.model import Model
+from tests.core.test_sensor import recognizer as answering
+from tests.core.test_sensor import run
 from tests.daemon.harness import Hand, floats
 from tests.hostile.grammar import violations
 from tests.scenario import frames
@@ -68,14 +70,9 @@ def touching(seer: Seer) -> list[Segment]:
 
 
 def recognizer(seer: Any, *, asked: bool = True, taps: bool = True, **more: Any) -> Sensor:
-    gestures = tuple(more.pop("gestures", GESTURES))
-    subject = Sensor("arm", Scene(gestures, (9, 9), provisional_taps=taps, **more), seer)
+    subject = answering(seer, provisional_taps=taps, **more)
     subject.foresee(asked=asked)
     return subject
-
-
-def run(subject: Sensor, stream: Sequence[Frame]) -> list[Event]:
-    return events_of(event for frame in stream for event in subject.push(frame))
 
 
 def names(events: Sequence[Event]) -> list[str]:
@@ -102,7 +99,7 @@ def test_it_is_said_once_while_the_finger_is_down_and_confirmed() -> None:
     assert names(events) == ["onset", "left?", "left confirmed", "release"]
     onset, early, answer, _ = events
     assert isinstance(early, Provisional) and isinstance(answer, Gesture) and isinstance(onset, Onset)
-    assert (early.sensor, early.id, early.gesture, early.onset) == ("arm", answer.id, "left", onset.onset)
+    assert (early.sensor, early.id, early.gesture, early.onset) == ("armrest", answer.id, "left", onset.onset)
     assert early.confidence == pytest.approx(0.95) and onset.onset < early.decided < answer.offset < answer.decided
     assert len(seer.looked) == 2 and seer.asked == 1  # two frames in a row, and nothing once it is said
 

@@ -29,7 +29,7 @@ activities = st.sampled_from([0.0, 2.0, 5.0, 8.0, 50.0, 1000.0])
 places = st.sampled_from([(4.0, 4.0), (4.0, 4.5), (0.0, 8.0)])
 
 
-def deeds(stream: Stream, wait: bool = True, sure_s: float = 0.0) -> list[Deed]:
+def deeds(stream: Stream, wait: bool, sure_s: float = 0.0) -> list[Deed]:
     """What a segmenter says of a stream, asked as the front end asks it; no frame is overdue for so many seconds."""
     segmenter = Segmenter(81, 0.15 * 9, wait_for_double_tap=wait)
     t, said = 0.0, list[Deed]()
@@ -38,11 +38,6 @@ def deeds(stream: Stream, wait: bool = True, sure_s: float = 0.0) -> list[Deed]:
         said += segmenter.wait(t, sure)
         said += segmenter.push(t, activity, place if activity >= segmenter.off else None)
     return said
-
-
-def play(stream: Stream, wait: bool = True) -> list[Action]:
-    """The actions alone that a segmenter says of a stream."""
-    return [deed.action for deed in deeds(stream, wait)]
 
 
 def table() -> dict[tuple[Phase, Signal], tuple[Phase, Action | None]]:
@@ -66,7 +61,7 @@ def test_the_page_shows_the_table() -> None:
 
 @given(st.lists(st.tuples(waits, activities, places), max_size=60), st.booleans())
 def test_whatever_comes_has_its_row_and_each_onset_its_end(stream: Stream, wait: bool) -> None:
-    said = [one for one in play(stream, wait) if one is not Action.RISE]
+    said = [deed.action for deed in deeds(stream, wait) if deed.action is not Action.RISE]
     after: dict[Action, tuple[Action, ...]] = dict.fromkeys(
         (Action.OPEN, Action.SPLIT), (Action.CLOSE, Action.SPLIT, Action.HELD)
     )

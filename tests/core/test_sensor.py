@@ -54,7 +54,7 @@ class Fake(Classifier):
         return answer
 
 
-def recognizer(classifier: Fake, sequence: int = 0, **settings: Any) -> Sensor:
+def recognizer(classifier: Any, sequence: int = 0, **settings: Any) -> Sensor:
     scene = Scene(**{"gestures": classifier.gestures, "grid": (9, 9)} | settings)
     return Sensor("armrest", scene, classifier, numbers=(sequence, 0))
 

@@ -23,7 +23,7 @@ from gestured.simulator import SimulatedSensor
 from gestured.simulator.live import LiveTextile
 from gestured.simulator.people import Press
 from tests import encoding
-from tests.core.test_sensor import DOUBLE, SWIPE, Fake, says
+from tests.core.test_sensor import DOUBLE, SWIPE, Fake, recognizer, run, says
 from tests.core.test_where import drawn
 from tests.scenario import frames
 
@@ -33,9 +33,8 @@ Path = Callable[[float], Fingers]
 
 def sensor(*, asked: bool = True, zones: dict[str, Any] | None = None, grid: tuple[int, int] = (9, 9)) -> Sensor:
     """A sensor that answers `left` to everything."""
-    classifier = Fake()
     setup = {"armrest": Setup(zones=zones_of(zones or {}))}
-    subject = Sensor("armrest", Scene(classifier.gestures, grid, sensors=setup, touch=True), classifier)
+    subject = recognizer(Fake(), grid=grid, sensors=setup, touch=True)
     subject.follow([], asked=asked)
     return subject
 
@@ -57,7 +56,7 @@ class Hand:
             self.t += 1 / self.rate_hz
             values = 300 + self._random.normal(0, 2, self.grid)
             values += drawn(*path(k / count), grid=self.grid, width=self.width, peak=peak)
-            self.told += events_of(self.subject.push(Frame(self.t, self.unit * values)))
+            self.told += run(self.subject, [Frame(self.t, self.unit * values)])
         return [one for one in self.told[before:] if isinstance(one, Touch)]
 
     def rests(self, seconds: float) -> list[Touch]:
@@ -152,10 +151,7 @@ def test_each_finger_that_is_down_is_up_whatever_comes(deeds: list[str], grid: t
 )
 def test_answers_are_the_same_whether_or_not_somebody_follows(lines: tuple[str, ...]) -> None:
     stream = frames("quiet for 1500ms", *lines, "quiet for 1500ms", *lines, "quiet for 1500ms")
-    told = []
-    for asked in (False, True):
-        subject = sensor(asked=asked)
-        told.append(events_of(one for frame in stream for one in subject.push(frame)))
+    told = [run(sensor(asked=asked), stream) for asked in (False, True)]
     assert not any(isinstance(one, Touch) for one in told[0]) and any(isinstance(one, Touch) for one in told[1])
     assert [one for one in told[1] if not isinstance(one, Touch)] == told[0]
 
@@ -204,7 +200,7 @@ def test_under_a_resting_arm_touches_belong_to_what_moves() -> None:
     across, firm = wide * (0.5 - 0.25 * np.cos(4 * t)), np.ones(t.size)
     finger = Press(t, across, 0.3 * high * firm, firm, 5.5, 5.5)
     times = np.arange(1, 32 * 15) / 15
-    told = events_of(one for t in times for one in subject.push(Frame(t, textile.frame(t, [arm, finger]))))
+    told = run(subject, [Frame(t, textile.frame(t, [arm, finger])) for t in times])
     checked(told)
     touches = [one for one in told if isinstance(one, Touch)]
     rests, moves = ([one for one in touches if (one.t < 7) == early] for early in (True, False))

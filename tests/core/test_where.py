@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 
 from gestured.core.cutter import LARGEST
 from gestured.core.events import Gesture, Place, Unknown, Where
-from gestured.core.facts import events_of
 from gestured.core.frames import Segment
 from gestured.core.mounting import Mounting
-from gestured.core.scene import Scene, Setup
-from gestured.core.sensor import Sensor
+from gestured.core.scene import Setup
 from gestured.core.spots import Spot
 from gestured.core.spots import spots as spots_in
 from gestured.core.where import where as where_in
-from tests.core.test_sensor import SWIPE, Fake, says
+from tests.core.test_sensor import SWIPE, Fake, answers, recognizer, run, says
 from tests.scenario import frames
 
 Array = NDArray[np.float64]
@@ -169,14 +167,12 @@ def told(
 ) -> Where:
     """Where the one answer to these lines was, on a sensor of which one taxel may show nothing."""
     setup = {"armrest": Setup(mounting=mounting or Mounting())}
-    classifier = Fake([says(0.05, confidence, 0.05)])
-    subject = Sensor("armrest", Scene(classifier.gestures, (9, 9), sensors=setup), classifier)
+    subject = recognizer(Fake([says(0.05, confidence, 0.05)]), sensors=setup)
     stream = frames("quiet for 1500ms", *lines, "quiet for 900ms")
     for frame in stream if dead else ():
         frame.values[dead] = 0.0
-    found = events_of(one for frame in stream for one in subject.push(frame))
-    (answer,) = (one for one in found if isinstance(one, Gesture | Unknown))
-    assert answer.where is not None and isinstance(answer, Gesture) == (confidence > 0.5)
+    (answer,) = answers(run(subject, stream))
+    assert isinstance(answer, Gesture if confidence > 0.5 else Unknown) and answer.where is not None
     return answer.where
 
 
@@ -194,7 +190,6 @@ def test_an_answer_says_that_its_way_led_over_a_bad_taxel_and_is_as_long_as_with
 
 
 def test_places_are_as_a_person_in_front_of_the_sensor_sees_them() -> None:
-    found = told(
-        "move 1,4 to 7,4 0.8 in 400ms", mounting=Mounting(rotate=90)
-    )  # downward, turned clockwise: to the left
+    downward = "move 1,4 to 7,4 0.8 in 400ms"
+    found = told(downward, mounting=Mounting(rotate=90))  # turned clockwise: to the left
     assert found.start.x > 0.7 and found.end.x < 0.25

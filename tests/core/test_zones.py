@@ -9,12 +9,9 @@ from hypothesis import strategies as st
 
 from gestured.core.classifier import Scores
 from gestured.core.events import Gesture, Place, Unknown
-from gestured.core.facts import events_of
-from gestured.core.scene import Scene, Setup
-from gestured.core.sensor import Sensor
+from gestured.core.scene import Setup
 from gestured.core.where import zone_at, zones_of
-from tests.core.test_sensor import SWIPE, Fake, says
-from tests.scenario import frames
+from tests.core.test_sensor import SWIPED, Fake, answers, recognizer, run, says
 
 share = st.floats(0, 1)
 
@@ -59,13 +56,9 @@ def test_what_can_be_no_zone_is_named(told: dict[str, Any], says: str) -> None:
 
 def answer(zones: dict[str, Any], scores: Scores, **more: Any) -> Gesture | Unknown:
     """What becomes of a swipe from column 1 to 7 in row 4, so from the left half, half-way up."""
-    classifier = Fake([scores])
-    subject = Sensor(
-        "armrest", Scene(classifier.gestures, (9, 9), {"armrest": Setup(zones=zones_of(zones))}, **more), classifier
-    )
-    stream = frames("quiet for 1500ms", SWIPE, "quiet for 900ms")
-    found = events_of(one for frame in stream for one in subject.push(frame))
-    (one,) = (one for one in found if isinstance(one, Gesture | Unknown))
+    subject = recognizer(Fake([scores]), sensors={"armrest": Setup(zones=zones_of(zones))}, **more)
+    (one,) = answers(run(subject, SWIPED))
+    assert isinstance(one, Gesture | Unknown)
     return one
 
 
