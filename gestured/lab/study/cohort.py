@@ -114,7 +114,7 @@ def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, A
 
     Only the file of cut gestures: the whole sessions hold the same touches again.
     """
-    if folder is None or not (folder / REAL_FILES[0]).exists():
+    if folder is None:
         return None
     found = read(folder / REAL_FILES[0])
     if of_each is not None:
