@@ -15,13 +15,16 @@ from gestured.lab.recordings.origin import said
 from gestured.lab.train import MIXED, TrainingPlan
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import NON_GESTURES
 
 
 def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
     """One Markdown file beside each model."""
     for name, found in figures.items():
-        (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
+        card = _card(folder / f"{name}.onnx", name, found, plan)
+        with atomic_write(folder / f"{name}.md", PUBLIC) as file:
+            file.write(card.encode())
 
 
 def write_blocks(
