@@ -214,7 +214,7 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
     made = in_processes(partial(STREAMS[stream], seed), range(count), jobs, f"simulating {stream}")
     samples = collect(s for found in made for s in found)
     cache.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
+    with atomic_write(path, PUBLIC) as file:
         np.savez(file, **{name: getattr(samples, name) for name in Samples.__slots__})
     return samples
 

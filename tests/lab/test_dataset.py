@@ -1,5 +1,6 @@
 """What is learned from: cut as the daemon cuts, kept once made, and nobody on two sides of a split."""
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -182,6 +183,19 @@ def test_an_interrupted_simulation_is_not_taken_for_a_whole(tmp_path: Path, monk
     monkeypatch.setattr(dataset, "in_processes", interrupted)
     with pytest.raises(KeyboardInterrupt):
         simulated(tmp_path, "wide", 9, 3)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_kept_has_come_onto_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a power cut leaves no half of it, for which the next run would have no use."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        simulated(tmp_path, "wide", 9, 1)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -102,7 +102,7 @@ def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]
         "first": np.array([s.first for s in kept], np.int64), "last": np.array([s.last for s in kept], np.int64),
         "trial": np.array([index for index, _ in cut], np.int64),
     }  # fmt: skip
-    with atomic_write(path, PUBLIC, durable=False) as file:
+    with atomic_write(path, PUBLIC) as file:
         np.savez(file, **fields)
 
 
