@@ -29,7 +29,7 @@ Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
 def add_recordings(command: Add) -> None:
-    """Add the four subcommands; `command` takes a name, what it does and an example."""
+    """Add the three subcommands; `command` takes a name, what it does and an example."""
     collect = command("collect", "lead a participant through the protocol, and record the sensor that sends over OSC",
                       "gestured-lab collect --participant 07 --listen 0.0.0.0:9000")  # fmt: skip
     collect.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
