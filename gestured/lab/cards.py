@@ -12,16 +12,19 @@ from gestured.lab.export import NAME
 from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.recordings.origin import said
-from gestured.lab.train import MIXED, TrainingPlan
+from gestured.lab.train import MIXED, REAL_FILES, TrainingPlan
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import NON_GESTURES
 
 
 def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
     """One Markdown file beside each model."""
     for name, found in figures.items():
-        (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
+        card = _card(folder / f"{name}.onnx", name, found, plan)
+        with atomic_write(folder / f"{name}.md", PUBLIC) as file:
+            file.write(card.encode())
 
 
 def write_blocks(
@@ -76,6 +79,7 @@ def _by_kind(name: str, found: Mapping[str, Any]) -> list[str]:
     ]
 
 
+PUBLIC_DATA = "the real development recordings of CapFingerId (ten subjects; MIT licence, see NOTICE)"
 SETS = ("simulated, nominal", "simulated, wide", "real")
 WORST_OF = {
     "gesture": "gesture, named rightly",
@@ -97,9 +101,18 @@ def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -
     parts = OF_THE_FIRST if name == LADDER[0] else OF_ALL
     apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in parts]
     return templates.get_template("card.md").render(
-        name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), real=bool(said(path)),
+        name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), recordings=_recordings(path),
         table=[*HEAD, *_rows(found)], others=apart,
     )  # fmt: skip
+
+
+def _recordings(path: Path) -> str:
+    """The real recordings that a model learned from."""
+    files = [one.file for one in said(path) or []]
+    own = [file for file in files if file not in REAL_FILES]
+    parts = [PUBLIC_DATA] if len(own) < len(files) else []
+    parts += [f"recordings of one's own ({', '.join(own)})"] if own else []
+    return " and ".join(parts) or "no real recordings"
 
 
 def _rows(found: Mapping[str, Any], before: str = "") -> list[str]:

@@ -50,5 +50,5 @@ def restore(
 
 def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
+    with atomic_write(path, PUBLIC) as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]

@@ -11,12 +11,13 @@ from typing import Any
 
 from gestured import __version__
 from gestured.client.say import say
+from gestured.client.values import number
 from gestured.core.errors import GesturedError
 from gestured.core.listening import Arming
 from gestured.core.points import STRICTNESS, USUAL
 from gestured.lab.everyday import FIRST as FIRST_DAY
 from gestured.lab.made_of import command_of
-from gestured.lab.recordings.flags import add_recordings
+from gestured.lab.recordings.flags import LARGEST_SEED, add_recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
@@ -131,9 +132,8 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
-    study.add_argument(
-        "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"
-    )
+    study.add_argument("--seed", type=number(0, LARGEST_SEED, whole=True), default=0,
+                       help="of splits and training: same seed, same numbers (default: 0)")  # fmt: skip
     add_data(study)
     add_recordings(add)
     return top

@@ -9,13 +9,15 @@ import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from multiprocessing.pool import IMapIterator
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.errors import RecordingError
+from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.digest import code_digest
@@ -49,6 +51,7 @@ IDLE = 20  # frames that are put on each side of a cut recording
 DAY_S = 720.0  # of one person's everyday life
 ANY_SENSOR = 0.5  # share of the days on any sensor; the others are on the nominal one
 FASTEST_HZ = 40.0  # of a day's sensor: faster ones cost more and show the same
+WATCH_S = 1.0  # between two looks whether processes are alive, where nothing is finished
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
@@ -177,10 +180,29 @@ STREAMS: dict[str, Callable[[int, int], list[Sample]]] = {
 
 
 def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
-    """What is made of each number, in order, by so many processes at most; an interruption ends all of them."""
+    """What is made of each number, in order, by so many processes at most; an interruption ends all of them.
+
+    GesturedError where one of them is killed: its work is lost, and the pool would wait for it for ever.
+    """
     jobs = min(jobs, len(todo) or 1)
+    others = multiprocessing.active_children()
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        yield from progress(pool.imap(make, todo, chunksize=max(1, min(50, len(todo) // (4 * jobs)))), len(todo), title)
+        workers = [process for process in multiprocessing.active_children() if process not in others]
+        made = pool.imap(make, todo, chunksize=max(1, min(50, len(todo) // (4 * jobs))))
+        yield from progress(_while_alive(made, workers), len(todo), title)
+
+
+def _while_alive(made: "IMapIterator[T]", workers: Sequence[BaseProcess]) -> Iterator[T]:
+    while True:
+        try:
+            yield made.next(timeout=WATCH_S)
+        except multiprocessing.TimeoutError:
+            if not all(worker.is_alive() for worker in workers):
+                raise GesturedError(
+                    "a process that --jobs started was killed, as where there is too little memory"
+                ) from None
+        except StopIteration:
+            return
 
 
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
@@ -192,7 +214,7 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
     made = in_processes(partial(STREAMS[stream], seed), range(count), jobs, f"simulating {stream}")
     samples = collect(s for found in made for s in found)
     cache.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
+    with atomic_write(path, PUBLIC) as file:
         np.savez(file, **{name: getattr(samples, name) for name in Samples.__slots__})
     return samples
 

@@ -201,7 +201,7 @@ class Foretold:
         early: list[Evidences] = []
         contact, since, second, before = [], [], [], 0
         for nets, samples in parts:
-            cut, of, frames = prefixes(samples, np.arange(len(samples)))
+            cut, of, frames = prefixes(samples)
             whole.append(_evidence(nets, samples))
             released.append(_evidence(nets, at_release(samples)))
             early.append(_evidence(nets, cut))

@@ -177,7 +177,7 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
     """
     real = data.real
     if real is None or trained.held_out is None:
-        print("real recordings: left out, they are not here (--real FOLDER)")
+        print("real recordings: left out, since no --real FOLDER was named")
         return {}
     labels = targets(real)
     found: dict[str, Any] = {}

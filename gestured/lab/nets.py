@@ -104,16 +104,32 @@ class CnnLstm(Recurrent):
         return y.reshape(batch, time, -1)
 
 
-class Perceptron(nn.Module):
-    """A small feed-forward net on standardised features; the scaling is part of it."""
+class Standardising(nn.Module):
+    """A net whose inputs are standardised first; the scaling is part of it."""
 
     mean: Tensor
     scale: Tensor
 
-    def __init__(self, inputs: int, classes: int) -> None:
+    def __init__(self, inputs: int) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("scale", torch.ones(inputs))
+
+    def fit_scale(self, values: Tensor) -> None:
+        """Learn the standardisation from (N, inputs)."""
+        self.mean.copy_(values.mean(0))
+        self.scale.copy_(values.std(0).clamp(min=1e-3))
+
+    def standardised(self, values: Tensor) -> Tensor:
+        """(B, inputs), bounded."""
+        return ((values - self.mean) / self.scale).clamp(-6, 6)
+
+
+class Perceptron(Standardising):
+    """A small feed-forward net on features."""
+
+    def __init__(self, inputs: int, classes: int) -> None:
+        super().__init__(inputs)
         self.layers = nn.Sequential(
             nn.Linear(inputs, HIDDEN),
             nn.ReLU(),
@@ -124,14 +140,9 @@ class Perceptron(nn.Module):
             nn.Linear(HIDDEN, classes),
         )
 
-    def fit_scale(self, features: Tensor) -> None:
-        """Learn the standardisation from (N, inputs)."""
-        self.mean.copy_(features.mean(0))
-        self.scale.copy_(features.std(0).clamp(min=1e-3))
-
     def embed(self, features: Tensor) -> Tensor:
         """(B, inputs) -> (B, HIDDEN): the last hidden layer."""
-        hidden: Tensor = self.layers[:-1](((features - self.mean) / self.scale).clamp(-6, 6))
+        hidden: Tensor = self.layers[:-1](self.standardised(features))
         return hidden
 
     def forward(self, features: Tensor) -> Tensor:
@@ -185,28 +196,17 @@ class Decision(nn.Module):
         return scores.exp(), torch.sigmoid((cues * self.weight).sum(1) + self.bias)
 
 
-class Verifier(nn.Module):
+class Verifier(Standardising):
     """What both opinions say and remember, and what surrounded the segment -> the log-odds that nothing was meant."""
 
-    mean: Tensor
-    scale: Tensor
-
-    def __init__(self, cues: int, embedding: int, context: int, units: int = 64) -> None:
-        super().__init__()
-        inputs = cues + embedding + context
-        self.register_buffer("mean", torch.zeros(inputs))
-        self.register_buffer("scale", torch.ones(inputs))
+    def __init__(self, cues: int, embedding: int, context: int) -> None:
+        inputs, units = cues + embedding + context, 64
+        super().__init__(inputs)
         self.layers = nn.Sequential(nn.Linear(inputs, units), nn.ReLU(), nn.Dropout(0.2), nn.Linear(units, 1))
-
-    def fit_scale(self, values: Tensor) -> None:
-        """Learn the standardisation from (N, inputs)."""
-        self.mean.copy_(values.mean(0))
-        self.scale.copy_(values.std(0).clamp(min=1e-3))
 
     def forward(self, cues: Tensor, embedding: Tensor, context: Tensor) -> Tensor:
         """(B, cues), (B, E), (B, K) -> (B,) log-odds that no gesture was meant."""
-        values = (torch.cat([cues, embedding, context], 1) - self.mean) / self.scale
-        logit: Tensor = self.layers(values.clamp(-6, 6))
+        logit: Tensor = self.layers(self.standardised(torch.cat([cues, embedding, context], 1)))
         return logit[:, 0]
 
 

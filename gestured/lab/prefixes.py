@@ -55,19 +55,19 @@ def drawn(
     return lengths
 
 
-def prefixes(samples: Samples, chosen: NDArray[np.int64]) -> tuple[Samples, NDArray[np.int64], NDArray[np.int64]]:
-    """All prefixes of the chosen samples, in order; of which sample each is, and how many frames since its onset."""
+def prefixes(samples: Samples) -> tuple[Samples, NDArray[np.int64], NDArray[np.int64]]:
+    """All prefixes of the samples, in order; of which sample each is, and how many frames since its onset."""
     asked, least = askable(samples), floors(samples)
     windows: list[NDArray[np.float16]] = []
     of: list[int] = []
     since: list[int] = []
-    for i in chosen:
+    for i in range(len(samples)):
         begin, stop = int(samples.offsets[i]), int(samples.offsets[i + 1])
         whole = samples.frames[begin:stop].astype(np.float32)
         for end in np.flatnonzero(asked[begin:stop]):
             part = whole[: end + 1]
             windows.append((part / max(float(part.max()), float(least[i]))).astype(np.float16))
-            of.append(int(i))
+            of.append(i)
             since.append(int(end) - int(samples.first[i]))
     index = np.array(of, np.int64)
     each = {name: getattr(samples, name)[index] for name in OF_EACH}

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import gestured
+from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
@@ -104,7 +105,7 @@ class TrainingData:
 def load_data(
     plan: TrainingPlan, cache: Path, real: Path | None, jobs: int, recordings: Sequence[Path] = ()
 ) -> TrainingData:
-    """Simulate, or take from the cache, and read the real recordings where they are, and those of one's own."""
+    """Simulate, or take from the cache, and read the real recordings in their folder, and those of one's own."""
     found = _real(real, recordings)  # first, so that a wrong file is told of before anything is simulated
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
@@ -146,6 +147,12 @@ def _real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int
     parts = [recorded(read(path)) for path in _real_files(folder)]
     if recordings:
         own = own_recordings(recordings).samples
+        people = len(np.unique(own.people))
+        if not parts and people < FOLDS:
+            raise GesturedError(
+                f"--recordings: expected gestures of at least {FOLDS} people, found {people}, since each person is "
+                "judged by what learned from others; gestured-lab adapt learns from fewer"
+            )
         parts.append(replace(own, people=own.people + OWN))
     return (join(parts), len(parts[0])) if parts else None
 
@@ -164,9 +171,8 @@ def is_of(labels: NDArray[np.str_], title: str) -> NDArray[np.bool_]:
 
 
 def _real_files(folder: Path | None) -> list[Path]:
-    """The real recordings, all of them or none."""
-    paths = [folder / name for name in REAL_FILES] if folder else []
-    return paths if all(path.exists() for path in paths) else []
+    """The real recordings, where their folder was named."""
+    return [folder / name for name in REAL_FILES] if folder else []
 
 
 def folds(real: Samples) -> list[NDArray[np.bool_]]:

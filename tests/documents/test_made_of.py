@@ -1,6 +1,7 @@
 """Tables that a command has printed are of the models in this checkout, or say that they are not."""
 
 import re
+import resource
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,19 @@ def test_an_edited_figure_is_found(tmp_path: Path) -> None:
     with pytest.raises(GesturedError, match="2 rows of tables, and 1 would replace"):
         renew(page, "figures", [made_of("make it", [model]), "", "| right | 0.91 |"])
     assert edited(page.read_text()) == ["figures"]
+
+
+def test_a_page_for_which_there_is_no_room_stays_as_it_was(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(before := "what somebody wrote\n<!-- figures: begin -->\n<!-- figures: end -->\n")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before), limits[1]))  # EFBIG in place of a full disk's ENOSPC
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            renew(page, "figures", ["| right | 0.91 |"] * 100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert page.read_text() == before and list(tmp_path.iterdir()) == [page]
 
 
 @pytest.mark.parametrize("name", GENERATED)

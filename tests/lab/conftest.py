@@ -10,7 +10,7 @@ import pytest
 from gestured.lab.cli import LAB_PACKAGES
 
 MISSING = [package for package in LAB_PACKAGES if find_spec(package) is None]
-NEED_NO_LAB = {"recordings", "test_cli.py", "test_dataset.py", "test_digest.py", "test_early_sessions.py"}
+NEED_NO_LAB = {"recordings", "test_cli.py", "test_dataset.py", "test_digest.py"}
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:

@@ -70,7 +70,9 @@ def test_help_needs_no_torch_and_shows_an_example_that_is_valid(tmp_path: Path) 
         assert example[0] == command == parser().parse_args(example).command
 
 
-@pytest.mark.parametrize("line", ["", "fly", "train --jobs many", "train --epochs 3", "everyday --hours long"])
+@pytest.mark.parametrize(
+    "line", ["", "fly", "train --jobs many", "train --epochs 3", "everyday --hours long", "study --seed -1"]
+)
 def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(line.split())

@@ -1,12 +1,17 @@
 """What is learned from: cut as the daemon cuts, kept once made, and nobody on two sides of a split."""
 
+import errno
 import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gestured.core.errors import GesturedError
 from gestured.core.events import Event
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
@@ -157,25 +162,40 @@ def test_no_more_processes_start_than_there_are_pieces_of_work() -> None:
     assert (next(made), len(multiprocessing.active_children())) == (0, 2)
 
 
-class Broken:
-    """A pool whose work is interrupted half-way."""
+def killed(number: int) -> int:
+    """The work of a process that the system kills, as where memory runs out."""
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
 
-    def __enter__(self) -> "Broken":
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def imap(self, make: object, todo: range, chunksize: int) -> object:
-        yield STREAMS["wide"](9, 0)
-        raise KeyboardInterrupt
+def test_a_process_that_is_killed_ends_the_work() -> None:
+    with pytest.raises(GesturedError, match="a process that --jobs started was killed"):
+        list(in_processes(killed, range(3), 1, ""))
+    assert multiprocessing.active_children() == []
 
 
 def test_an_interrupted_simulation_is_not_taken_for_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(multiprocessing.get_context("spawn").__class__, "Pool", lambda *_: Broken())
-        with pytest.raises(KeyboardInterrupt):
-            simulated(tmp_path, "wide", 9, 3)
+    def interrupted(*_: object) -> Iterator[list[Sample]]:
+        yield STREAMS["wide"](9, 0)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(dataset, "in_processes", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        simulated(tmp_path, "wide", 9, 3)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_kept_has_come_onto_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a power cut leaves no half of it, for which the next run would have no use."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        simulated(tmp_path, "wide", 9, 1)
     assert list(tmp_path.iterdir()) == []
 
 

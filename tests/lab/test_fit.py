@@ -251,8 +251,3 @@ def test_stage_two_starts_from_stage_one_and_leaves_it_alone(samples: Samples) -
         assert np.array_equal(value, kept[name])
     moved = max(float(np.abs(tuned[n] - kept[n]).max()) for n in kept)
     assert 0 < moved < 0.5
-
-
-def test_real_recordings_are_left_out_where_they_are_not(tmp_path: Path) -> None:
-    assert train._real(None, []) is None
-    assert train._real(tmp_path, []) is None

@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab import train
 from gestured.lab.evaluate import outcome
 from gestured.lab.fit import targets
+from gestured.lab.study.cohort import real
 from gestured.record.arrays import write
+from gestured.simulator import GESTURES
 from tests.lab.adapt.recorded import cut_gestures
 
 
@@ -24,6 +27,26 @@ def folder(tmp_path: Path) -> Path:
     for name, recorded in zip(train.REAL_FILES, (cut, again), strict=True):
         write(tmp_path / name, recorded)
     return tmp_path
+
+
+def test_a_folder_without_the_recordings_is_told(folder: Path) -> None:
+    (folder / train.REAL_FILES[1]).unlink()
+    with pytest.raises(RecordingError, match=f"{train.REAL_FILES[1]}: cannot be read"):
+        train._real(folder, [])
+    (folder / train.REAL_FILES[0]).unlink()
+    with pytest.raises(RecordingError, match=f"{train.REAL_FILES[0]}: cannot be read"):
+        real(folder, None)
+
+
+def test_too_few_people_to_hold_one_out_are_refused(tmp_path: Path) -> None:
+    paths = []
+    for count, names in enumerate((("anna", "berta"), ("carla",)), 1):
+        paths.append(tmp_path / f"{count}.npz")
+        write(paths[-1], cut_gestures(names, GESTURES, repeats=2 // count))
+    with pytest.raises(GesturedError, match=r"--recordings: expected gestures of at least 3 people, found 2"):
+        train._real(None, paths[:1])
+    found = train._real(None, paths)
+    assert found is not None and [held.any() for held in train.folds(found[0])] == [True] * train.FOLDS
 
 
 def test_what_was_never_cut_is_lost_and_what_is_in_both_files_counts_once(folder: Path) -> None:

@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     base = base_of(args.base)
     own = own_recordings(args.recordings, args.as_none)
     cache = args.cache or cache_folder()
+    cache.mkdir(parents=True, exist_ok=True)
     takes = simulate(cache, JOBS)
     found = adapt(base, own, takes, Course(steps=args.steps))
     reasons = found.reasons()

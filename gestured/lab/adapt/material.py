@@ -22,6 +22,7 @@ from gestured.simulator import GESTURES, NONE
 
 MOST_PEOPLE = 1000  # more is another field, such as the number of the trial, where the participant belongs
 FEWEST = 20  # gestures; with fewer nobody can tell better from worse
+LEAST_CUT = 2  # gestures that are cut out: one to learn from while the other is held out
 GROUPS = 5  # of people, each of which is held out in turn
 
 
@@ -81,6 +82,11 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
         raise GesturedError(
             f"{', '.join(map(str, paths))}: expected at least {FEWEST} gestures of the model, "
             f"found {own.performed}{others}"
+        )
+    if (cut := int((own.samples.labels != NONE).sum())) < LEAST_CUT:
+        raise GesturedError(
+            f"{', '.join(map(str, paths))}: expected gestures that the front end cuts out, "
+            f"found {cut} of {own.performed}; are these the raw counts of a sensor?"
         )
     return own
 

@@ -103,40 +103,36 @@ def played(cache: Path, people: int, jobs: int = 2, *, judge: bool = False) -> S
     The plans are the kinds of non-gestures that somebody could perform, and signs that no network has learned; with
     `judge` other people and other signs. From `cache` where it was made before.
     """
-    digest = code_digest(__name__)[:8]
-    for name, stream in (("learn", _to_learn), ("judge", _to_judge)):
-        STREAMS[f"own-{name}-{digest}"] = stream
-    signs, name = (JUDGED, "judge") if judge else (LEARNED, "learn")
-    parts = len(PERFORMED + signs + GESTURES + NON_GESTURES)
-    return simulated(cache, f"own-{name}-{digest}", 0, people * parts, jobs)
+    stream = f"own-{code_digest(__name__)[:8]}"
+    STREAMS[stream] = _part
+    parts = len(PERFORMED + LEARNED + GESTURES + NON_GESTURES)
+    return simulated(cache, stream, TO_JUDGE if judge else TO_LEARN, people * parts, jobs)
 
 
-def _to_learn(seed: int, index: int) -> list[Sample]:
-    return list(_part(2 * seed, index, PERFORMED + LEARNED))
+TO_LEARN, TO_JUDGE = 0, 1  # seeds
 
 
-def _to_judge(seed: int, index: int) -> list[Sample]:
-    return list(_part(2 * seed + 1, index, PERFORMED + JUDGED))
-
-
-def _part(seed: int, index: int, plans: tuple[str, ...]) -> Iterator[Sample]:
+def _part(seed: int, index: int) -> list[Sample]:
     """One person's repetitions of one plan, or what else he does of one kind."""
+    plans = PERFORMED + (JUDGED if seed == TO_JUDGE else LEARNED)
     kinds = plans + GESTURES + NON_GESTURES
     nth, part = divmod(index, len(kinds))
     kind, number = kinds[part], FIRST_PERSON + 10_000 * seed + nth
     person, rng = Participant(number), generator(number, 0x5E)
     sensor = any_sensor(rng, 0.5) if nth % HARD == 0 else SimulatedSensor.nominal(day=number)
+    found: list[Sample] = []
     if part < len(plans):
         rng = generator(number, part)
         plan = (sign if kind in SIGNS else perform)(kind, person, rng, any_speed(rng), 1, sensor.extent)
         for trial in range(REPETITIONS):
             rng = generator(number, part, trial)
-            yield from _recorded(repeated(plan, rng, sensor.extent), sensor, rng, PLAN)
-        return
+            found += _recorded(repeated(plan, rng, sensor.extent), sensor, rng, PLAN)
+        return found
     for trial in range(GESTURE_TRIALS if kind in GESTURES else OTHER_TRIALS):
         rng = generator(number, part, trial)
         done = perform(kind, person, rng, any_speed(rng), int(rng.integers(3)), sensor.extent)
-        yield from _recorded(done, sensor, rng, done.label)
+        found += _recorded(done, sensor, rng, done.label)
+    return found
 
 
 def _recorded(

@@ -78,7 +78,9 @@ def _performed(kept: Recordings) -> list[Exercise]:
     if kept.speeds is None or kept.inclinations is None:
         return []
     kinds = kept.labels if kept.kinds is None else kept.kinds
-    fields = (kept.labels.tolist(), kinds.tolist(), kept.speeds.tolist(), kept.inclinations.tolist())
+    # Beside recordings of which nobody knows how the sensor lay, the numbers stand as texts.
+    inclinations = [int(n) if isinstance(n, str) and n.isdecimal() else n for n in kept.inclinations.tolist()]
+    fields = (kept.labels.tolist(), kinds.tolist(), kept.speeds.tolist(), inclinations)
     return [
         Exercise(kind if label == NONE else label, speed, inclination, label == NONE)
         for label, kind, speed, inclination in zip(*fields, strict=True)

@@ -102,7 +102,7 @@ def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]
         "first": np.array([s.first for s in kept], np.int64), "last": np.array([s.last for s in kept], np.int64),
         "trial": np.array([index for index, _ in cut], np.int64),
     }  # fmt: skip
-    with atomic_write(path, PUBLIC, durable=False) as file:
+    with atomic_write(path, PUBLIC) as file:
         np.savez(file, **fields)
 
 
@@ -114,7 +114,7 @@ def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, A
 
     Only the file of cut gestures: the whole sessions hold the same touches again.
     """
-    if folder is None or not (folder / REAL_FILES[0]).exists():
+    if folder is None:
         return None
     found = read(folder / REAL_FILES[0])
     if of_each is not None:

@@ -176,6 +176,16 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz"]
 
 
+def test_a_cache_that_cannot_be_made_is_told_before_anything_is_simulated(
+    base: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "simulate", lambda *_: pytest.fail("simulates"))
+    write(tmp_path / "a.npz", cut_gestures(("07", "08"), GESTURES, repeats=2))
+    line = f"adapt {tmp_path}/a.npz --out {tmp_path}/my.onnx --base {base} --cache {tmp_path}/a.npz"
+    assert main(line.split()) == 1
+    assert f"File exists: '{tmp_path}/a.npz'" in capsys.readouterr().err
+
+
 @pytest.mark.hostile
 @pytest.mark.timeout(900)
 def test_the_same_recordings_give_the_same_model(run: Run, tmp_path: Path) -> None:

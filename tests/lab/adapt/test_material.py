@@ -99,6 +99,7 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
     labels = np.array(["one_tap"] * count)
     crowd = Recordings(frames, times, np.arange(0, 2 * count + 1, 2), labels, np.arange(count))
     write(tmp_path / "crowd.npz", crowd)
+    write(tmp_path / "still.npz", replace(good, frames=np.full_like(good.frames, 100)))
     (tmp_path / "text.npz").write_text("no recording")
     for names, reason in (
         (["text.npz"], "text.npz: cannot be read as a recording"),
@@ -109,6 +110,7 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
         (["nan.npz"], r"nan.npz: frames of recording 0: expected finite values"),
         (["good.npz", "wide.npz"], r"wide.npz: frames: expected the grid 9x9 .* found 9x18"),
         (["crowd.npz"], r"subjects: expected at most 1000 people"),
+        (["still.npz"], rf"still.npz: expected gestures that the front end cuts out, found 0 of {len(good)};"),
     ):
         with pytest.raises(GesturedError, match=reason) as told:
             own_recordings([tmp_path / name for name in names])

@@ -180,7 +180,7 @@ def test_without_a_terminal_it_says_what_it_needs(
 @pytest.mark.parametrize(
     ("flag", "value"),
     [("--participant", "Anna Meier"), ("--gestures", "one_tap,Wave"), ("--gestures", "swipe_lft"), ("--grid", "1x9"),
-     ("--repeats", "0"), ("--countdown", "x"), ("--listen", "9000"), ("--sensor", "a/b")],
+     ("--repeats", "0"), ("--seed", "-1"), ("--countdown", "x"), ("--listen", "9000"), ("--sensor", "a/b")],
 )  # fmt: skip
 def test_flags_are_checked(flag: str, value: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:

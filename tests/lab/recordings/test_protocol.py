@@ -2,6 +2,7 @@
 
 import argparse
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left, order, pseudonym
+from gestured.lab.recordings.store import join_recordings
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, SPEEDS
 
@@ -47,6 +49,12 @@ def test_what_is_left_and_what_was_kept_are_the_whole(repeats: int, data: st.Dat
     rest = left(trials, kept(done))
     assert Counter(rest) + Counter(done) == Counter(trials)
     assert left(trials, None) == trials
+
+
+def test_what_is_kept_beside_imported_recordings_is_not_asked_for_again() -> None:
+    trials = order("07", 0, GESTURES[:2], 1)
+    imported = replace(kept(trials[:1]), speeds=None, inclinations=None)
+    assert left(trials, join_recordings([imported, kept(trials[:3])])) == trials[3:]
 
 
 @pytest.mark.parametrize("name", ["07", "A", "a_b-C9", "x" * 32])

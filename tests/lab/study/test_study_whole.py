@@ -44,9 +44,8 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     small = Plan.small
     monkeypatch.setattr(Plan, "small", lambda seed: replace(small(seed), steps=4, timed=2))
     monkeypatch.setattr(cohort, "in_processes", lambda make, todo, *_: map(make, todo))
-    (tmp_path / "none").mkdir()
     write(tmp_path / "foreign.npz", recordings(1))
-    where = ["--cache", str(tmp_path / "cache"), "--real", str(tmp_path / "none"), "--jobs", "1"]
+    where = ["--cache", str(tmp_path / "cache"), "--jobs", "1"]
     where += ["--foreign", str(tmp_path / "foreign.npz")]
     pages = [tmp_path / "docs" / f"{block}.md" for block in ("study", "choice")]
     pages[0].parent.mkdir()
