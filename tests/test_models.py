@@ -366,11 +366,6 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     refusal(path)
 
 
-@pytest.fixture(scope="module")
-def good_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return build(tmp_path_factory.mktemp("good") / "m.onnx").read_bytes()
-
-
 # --- data in other files ---
 
 
@@ -461,9 +456,9 @@ def test_onnxruntimes_own_format_is_no_model(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def exported(good_bytes: bytes) -> bytes:
+def exported(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """As the laboratory writes it."""
-    return model_file.sealed(good_bytes)
+    return model_file.sealed(build(tmp_path_factory.mktemp("good") / "m.onnx").read_bytes())
 
 
 @given(

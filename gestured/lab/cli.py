@@ -1,6 +1,7 @@
 """`gestured-lab`: train, evaluate and measure. Needs the extra [lab] (torch, scikit-learn, onnx)."""
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gestured import __version__
+from gestured.client.program import Parser, program, run
 from gestured.client.say import say
 from gestured.client.values import number
 from gestured.core.errors import GesturedError
@@ -37,21 +38,19 @@ PROGRAMS = {
 }
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """The command line; every subcommand's help has an example."""
-    top = argparse.ArgumentParser(
-        prog="gestured-lab",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Train and evaluate gestured's models.",
-        epilog="example: gestured-lab train --out models\n\n"
-        "`gestured-lab COMMAND --help` explains one command, with an example.",
-    )
-    top.add_argument("--version", action="version", version=f"gestured-lab {__version__}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    top, commands = program(
+        "gestured-lab", "COMMAND", "Train and evaluate gestured's models.",
+        "example: gestured-lab train --out models",
+    )  # fmt: skip
 
     def add(name: str, text: str, example: str) -> argparse.ArgumentParser:
-        command = commands.add_parser(name, help=text, description=text, epilog=f"example: {example}")
+        command = commands.add_parser(
+            name, help=text, description=text, epilog=f"example: {example}", formatter_class=argparse.HelpFormatter
+        )
         command.add_argument("--json", action="store_true", help="print the figures as JSON")
+        command.set_defaults(command=name, run=_run)
         return command
 
     def add_data(command: argparse.ArgumentParser) -> None:
@@ -141,16 +140,23 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    args = parser().parse_args(arguments)
-    args.words = command_of(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has not all letters shows question marks
+    given = sys.argv[1:] if arguments is None else arguments
+    top = parser()
+    top.set_defaults(words=command_of(["gestured-lab", *given]))
+    return run(top, given)
+
+
+def _run(args: argparse.Namespace) -> int:
+    """Run a command, whatever it is."""
     try:
-        program = _program(args.command)
+        module = _program(args.command)
         _check(args)
-        status: int = program.run(args)
+        status: int = module.run(args)
         return status
-    except (GesturedError, OSError) as error:
-        say(f"gestured-lab: {error}", to=sys.stderr)
-        return 1
+    except OSError as error:
+        raise GesturedError(str(error)) from error
     except KeyboardInterrupt:
         say("", "gestured-lab: interrupted; what is finished is kept", to=sys.stderr)
         return 130

@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from gestured.client.say import say, say_drawn
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import write_manifest
@@ -38,7 +39,7 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     start = time.monotonic()
     train(plan, args.out, args.cache, args.real, args.jobs, args.recordings)
     minutes = (time.monotonic() - start) / 60
-    print(f"trained in {minutes:.1f} minutes (finished steps are taken from {args.cache})", flush=True)
+    say(f"trained in {minutes:.1f} minutes (finished steps are taken from {args.cache})")
     for name in LADDER:
         path = args.out / f"{name}.onnx"
         if own.open_file(path).embeds:
@@ -56,10 +57,10 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     trained = learn(plan, data, args.cache)
     for name, of in real_figures(trained, calibration_set(trained, data), data).items():
         figures[name]["real"] = of
-    print("\n".join(table(figures)), flush=True)
+    say(*table(figures))
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
     if args.document:
         write_blocks(args.document, args.models, figures, args.words)
     if args.json:
-        print(json.dumps(figures, indent=2))
+        say_drawn(json.dumps(figures, indent=2))

@@ -220,15 +220,22 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
 
 
 def recorded(recordings: Recordings) -> Samples:
-    """Cut gestures or whole sessions as samples; what the truth does not name is left out."""
-    return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i))
+    """Cut gestures or whole sessions as samples; what the truth does not name, and a single frame, is left out.
+
+    People who have names become numbers, in the order of their names.
+    """
+    people = recordings.subjects
+    if people.dtype.kind == "U":
+        people = np.unique(people, return_inverse=True)[1]
+    return collect(s for i, person in enumerate(people.tolist()) for s in _recorded(recordings, i, int(person)))
 
 
-def _recorded(recordings: Recordings, i: int) -> Iterator[Sample]:
+def _recorded(recordings: Recordings, i: int, person: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
-    person = int(recordings.subjects[i])
+    if len(times) < 2:
+        return
     # Marks are frames, and a frame stands for the time around it: a tap of one frame has a duration, too.
-    half = float(np.median(np.diff(times))) / 2 if len(times) > 1 else 0.0
+    half = float(np.median(np.diff(times))) / 2
     if recordings.labels[i] == "session":
         of, labels, kinds, onsets, offsets = (
             _needed(recordings, f"event_{name}") for name in ("recording", "labels", "kinds", "onsets", "offsets")
@@ -244,7 +251,8 @@ def _recorded(recordings: Recordings, i: int) -> Iterator[Sample]:
         return
     first, last = int(_needed(recordings, "onsets")[i]), int(_needed(recordings, "releases")[i])
     frames, times, lead = with_idle(frames, times, first, last, i)
-    label, kind = str(recordings.labels[i]), str(_needed(recordings, "kinds")[i])
+    label = str(recordings.labels[i])
+    kind = label if recordings.kinds is None else str(recordings.kinds[i])
     onset, offset = times[first + lead] - half, times[last + lead] + half
     yield from matched(cuts(frames, times), [Truth(label, kind, person, onset, offset)])
 

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from gestured.client.say import say
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.fit import CLASSES, RECURRENT, padded, targets
 from gestured.lab.intervals import interval
@@ -177,7 +178,7 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
     """
     real = data.real
     if real is None or trained.held_out is None:
-        print("real recordings: left out, since no --real FOLDER was named")
+        say("real recordings: left out, since no --real FOLDER was named")
         return {}
     labels = targets(real)
     found: dict[str, Any] = {}

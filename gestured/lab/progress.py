@@ -5,6 +5,8 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
+from gestured.client.say import say_drawn
+
 T = TypeVar("T")
 
 
@@ -25,6 +27,6 @@ def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
         rest = (now - start) / done * (total - done)
         bar = "#" * round(20 * done / total)
         text = f"{title:<28} [{bar:<20}] {done}/{total}  {_clock(now - start)} gone, {_clock(rest)} left"
-        print(("\r" + text) if terminal else text, end="" if terminal else "\n", file=sys.stderr, flush=True)
+        say_drawn(("\r" + text) if terminal else text, end="" if terminal else "\n", to=sys.stderr)
     if terminal:
-        print(file=sys.stderr)
+        say_drawn("", to=sys.stderr)

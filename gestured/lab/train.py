@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import gestured
+from gestured.client.say import say_drawn
 from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL
 from gestured.lab.adapt.material import own_recordings
@@ -317,7 +318,7 @@ def train(
         module, calibration, answered = judged(trained, name, calibrated, data)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
         points = measured_points(trained, module, name, data, plan)
-        print(f"{name}\n{by_strictness(points)}", flush=True)
+        say_drawn(f"{name}\n{by_strictness(points)}")
         rule = contacts.rule(name, module, np.array(list(points[USUAL]["thresholds"].values())))
         more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
         export_net(module, out / f"{name}.onnx", Facts(**common, **more))

@@ -16,7 +16,9 @@ import pytest
 from gestured.lab.cli import LAB_PACKAGES, main, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
-from gestured.simulator import NON_GESTURES
+from gestured.record.arrays import write
+from gestured.record.recordings import Recordings
+from gestured.simulator import NON_GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -136,6 +138,21 @@ def test_an_interrupted_run_says_that_nothing_finished_is_lost(
     monkeypatch.setattr(command, "run", interrupt)
     assert main(["everyday"]) == 130
     assert "what is finished is kept" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("lab")
+def test_a_log_on_a_full_disk_stops_nothing_and_a_terminal_need_not_have_all_letters(tmp_path: Path) -> None:
+    take = gesture_take("swipe_left", Participant(901), SimulatedSensor.nominal(day=901), generator(3, 1))
+    one = np.array([0, len(take.times)]), np.array(["session"]), np.array(["07"])
+    write(tmp_path / "né\x1b.npz", Recordings(take.frames, take.times, *one))
+    command = [sys.executable, "-m", "gestured.lab.cli", "everyday", "lstm", "--jobs", "1", "--recordings"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*command, tmp_path / "né\x1b.npz"], stdout=subprocess.PIPE, stderr=full, env=environment, text=True
+        )
+    assert done.returncode == 0
+    assert "| n?\\x1b |" in done.stdout
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -269,6 +270,18 @@ def test_cut_recordings_are_learned_under_their_own_names() -> None:
     assert found.people.tolist() == [0, 1, 2, 3]
     for i in range(len(found)):
         assert found.window(i).max() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_people_may_have_names_and_kinds_need_not_be_known() -> None:
+    found = recorded(replace(recordings(), subjects=np.array(["carla", "anna", "berta", "anna"]), kinds=None))
+    assert found.people.tolist() == [2, 0, 1, 0]
+    assert found.kinds.tolist() == ["swipe_up", "one_tap", "circle_clockwise", "none"]
+
+
+def test_a_single_frame_is_no_gesture() -> None:
+    one = {"offsets": np.array([0, 1]), "labels": np.array(["one_tap"]), "subjects": np.array([1])}
+    marks = {"onsets": np.array([0]), "releases": np.array([0])}
+    assert len(recorded(Recordings(np.ones((1, 9, 9)), np.zeros(1), **one, **marks))) == 0
 
 
 def test_a_tap_of_a_single_frame_is_learned_like_any_other() -> None:

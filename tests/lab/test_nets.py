@@ -1,12 +1,11 @@
 """The networks: what follows a gesture changes no answer, and each of them can learn what it is shown."""
 
-import numpy as np
 import pytest
 import torch
 from torch import Tensor, nn
 
 from gestured.lab.fit import NETS, build
-from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm
+from gestured.lab.nets import CnnLstm, Decision, Lstm
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.model.features import ACTIVE
 from tests.lab.made import gestures
@@ -96,18 +95,6 @@ def test_one_batch_can_be_learned_by_heart(kind: type[nn.Module], rate: float) -
     with torch.no_grad():
         right = float((net(x).argmax(1) == y).float().mean())
     assert right > 0.95
-
-
-def test_what_is_exported_gives_probabilities(nets: nn.ModuleDict) -> None:
-    decision = Decision(10)
-    decision.weight.copy_(torch.tensor([0.4, 0.3, 0.1, 0.1, 0.2, 0.5]))
-    x = nn.utils.rnn.pad_sequence([torch.from_numpy(f) for f in MADE.values()], batch_first=True)
-    with torch.no_grad():
-        scores, unknown, _ = Judged(nets["cnn_lstm"], nets["trajectory"], decision).eval()(x)
-    assert scores.shape == (len(MADE), 10)
-    np.testing.assert_allclose(scores.sum(1), 1.0, atol=1e-5)
-    assert float(scores.min()) >= 0
-    assert bool(((unknown >= 0) & (unknown <= 1)).all())
 
 
 @pytest.mark.parametrize("size", [0.0, 1.0, 1e4, 1e30])

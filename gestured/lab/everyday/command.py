@@ -8,6 +8,7 @@ from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
+from gestured.client.say import say_drawn
 from gestured.core.errors import GesturedError
 from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
@@ -98,7 +99,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
     """Print the figures."""
-    print(json.dumps(found) if as_json else "\n".join(map(str, shown)))
+    say_drawn(json.dumps(found) if as_json else "\n".join(map(str, shown)))
 
 
 def _lived(model: str, strictness: Strictness, arming: Arming | None, seed: int) -> list[Heard]:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from gestured.client.say import shown
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
 from gestured.core.scene import Setup
@@ -71,7 +72,7 @@ def _arrays(path: Path) -> Iterator[Stretch]:
         meant = [act for act in acts if act.label not in (NONE, UNNAMED)]
         unnamed = [act for act in acts if act.label == UNNAMED]
         setup = Setup(grid=found.frames.shape[1:])
-        yield Stretch(path.stem, str(found.subjects[i]), found.stream(i), setup, meant, [], unnamed=unnamed)
+        yield Stretch(shown(path.stem), str(found.subjects[i]), found.stream(i), setup, meant, [], unnamed=unnamed)
 
 
 def _tape(path: Path) -> Iterator[Stretch]:
@@ -81,4 +82,4 @@ def _tape(path: Path) -> Iterator[Stretch]:
         raise RecordingError(f"{path}: holds no frames that a daemon could use")
     for name, frames in used.items():
         setup = Setup(maker.scene.grid_of(name), maker.scene.setup(name).mounting)
-        yield Stretch(f"{path.stem}: {name}", path.stem, frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
+        yield Stretch(f"{shown(path.stem)}: {name}", path.stem, frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)

@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
+from gestured.client.say import say_drawn
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
@@ -35,11 +36,11 @@ def run(args: argparse.Namespace) -> int:
         table = make(args.quick)
         done.append(asdict(table))
         if not args.json:
-            print(table, flush=True)
+            say_drawn(str(table))
         if args.document:
             code = WITHOUT_MODELS.get(name)
             made = made_of(args.words, [], code) if code else made_of(args.words, shipped().values())
             renew(args.document, name, [made, "", str(table)])
     if args.json:
-        print(json.dumps(done, indent=2))
+        say_drawn(json.dumps(done, indent=2))
     return 0

@@ -45,7 +45,9 @@ from gestured.lab.study.tables import TUNED, Cell, Plan, task
 from gestured.lab.study.training import SENSOR_SIDE, Answering, HistoryNet, Net
 from gestured.lab.study.views import Values
 from gestured.lab.train import REAL_SETS
+from gestured.model.model import RUN_S
 from gestured.model.opening import open_model
+from gestured.model.session import Session
 from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
 
@@ -63,17 +65,11 @@ class Runner:
 
 
 class Graph:
-    """A network or a forest as ONNX, opened as the daemon does: one thread, no spinning."""
+    """A network or a forest as ONNX, opened and run as the daemon does."""
 
     def __init__(self, data: bytes) -> None:
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        options.log_severity_level = 3
         self.data = data
-        self._session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        self._session = Session(data)
 
     @classmethod
     def of_net(cls, module: nn.Module) -> "Graph":
@@ -89,13 +85,13 @@ class Graph:
             path = Path(folder) / "net.onnx"
             torch.onnx.export(
                 net.eval(), (example,), path, dynamo=False, opset_version=OPSET,
-                input_names=["inputs"], output_names=["scores"], dynamic_axes={"inputs": axes, "scores": {0: "B"}},
+                input_names=["features"], output_names=["scores"], dynamic_axes={"features": axes, "scores": {0: "B"}},
             )  # fmt: skip
             return cls(path.read_bytes())
 
     def run(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """(1, ...) inputs -> (1, G) scores."""
-        return np.asarray(self._session.run(["scores"], {self._session.get_inputs()[0].name: inputs})[0])
+        return self._session.run(["scores"], {"features": inputs}, RUN_S)[0]
 
 
 def _learned(method: str, values: Values, model: Estimator | Graph) -> Runner:

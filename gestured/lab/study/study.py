@@ -15,6 +15,7 @@ from typing import Any
 import torch
 
 import gestured
+from gestured.client.say import say_drawn
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew, require_marks
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         write_picture(study, args.document[0].parent)
         for document in args.document[1:]:
             renew(document, "choice", [made, "", *choice(study)])
-    print(json.dumps(study, indent=2) if args.json else f"{tables_path}: {study['machine']['minutes']} minutes")
+    say_drawn(json.dumps(study, indent=2) if args.json else f"{tables_path}: {study['machine']['minutes']} minutes")
     return 0
 
 

@@ -8,26 +8,17 @@ import numpy as np
 import pytest
 
 from gestured.control.cli import parser as gesturectl_parser
-from gestured.core.frames import Frame
 from gestured.lab.cli import main, parser
 from gestured.lab.recordings.protocol import Exercise
-from gestured.lab.recordings.quality import Captured
-from gestured.lab.recordings.store import join_recordings, recording, touched
+from gestured.lab.recordings.store import join_recordings, recording
 from gestured.record.arrays import read, write
-from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
+from gestured.simulator import GESTURES
 from tests.lab.recordings.test_import import csv_lines, take, written
+from tests.lab.recordings.test_quality import performed
 
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "collecting.md"
 BLOCKS = re.findall(r"^```(sh|python)\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)
 NEEDS_A_SENSOR = "# needs a sensor"
-
-
-def collected(gesture: str) -> Captured:
-    made = gesture_take(gesture, Participant(7), SimulatedSensor.nominal(day=7), generator(8, 1), "normal", 1)
-    marks = touched(made.frames, made.times)
-    assert marks is not None
-    frames = tuple(Frame(float(t), values) for t, values in zip(made.times, made.frames, strict=True))
-    return Captured(frames, *marks, 1.0)
 
 
 def test_the_walk_through_runs(
@@ -35,7 +26,7 @@ def test_the_walk_through_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("recordings").mkdir()
-    takes = [recording(collected(g), Exercise(g, "normal", 0), "07", "2026-01-31") for g in GESTURES]
+    takes = [recording(performed(g, 7), Exercise(g, "normal", 0), "07", "2026-01-31") for g in GESTURES]
     write("recordings/07.npz", join_recordings(takes))
     for name in ("left-1.csv", "left-2.csv"):
         written(Path(name), csv_lines(take()))
