@@ -225,6 +225,7 @@ def test_a_gate_that_closes_while_a_contact_goes_on_revokes_what_was_foreseen() 
         ({"arming": {"by": "left", "seconds": math.nan}}, "arming.seconds"),
         ({"arming": {"seconds": 5}}, "arming: expected `by`"),
         ({"arming": ["left"]}, "arming: expected `by`"),
+        ({"arming": {"by": "left", "second": 5}}, "arming: expected `by`"),
         ({"gate": {"start": ["a/b"]}}, "gates.start: expected names of A-Z a-z 0-9 _ -, found 'a/b'"),
     ],
 )

@@ -160,6 +160,9 @@ def test_strangers_cost_the_same_however_many_sensors_there_are() -> None:
     # A place is free as soon as one of them has been silent for long enough.
     (new,) = hub.receive([(floats("/x0/pressure", frame, 0), STRANGER)], 1.5 + FORGET_S)[:1]
     assert isinstance(new, Changed) and new.what == "new"
+    kept = Hub(replace(SCENE, sensors={"arm": Setup()}, max_sensors=1), Sure())  # there is no place for any stranger
+    (dropped,) = kept.receive([(floats("/x0/pressure", frame, 0), STRANGER)], 1.0)
+    assert isinstance(dropped, Dropped) and dropped.reason == "too_many_sensors"
 
 
 @pytest.mark.parametrize("what", ["restart", "change"])
