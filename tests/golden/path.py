@@ -1,25 +1,32 @@
 """The one place where golden tapes meet today's code: whoever moves that code rewrites this file, and only this one.
 
 `play` is the daemon's own hub, at times that are written down. `replay` is the same tape as a file that `gesturectl
-replay` plays.
+replay` plays. `front_ends` is the path up to the segments, without a classifier.
 """
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import MISSING, asdict, fields
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from gestured.core.beside.reading import Reading
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
+from gestured.core.frames import Frame, Segment
+from gestured.core.front_end import Ended, Found, FrontEnd, Opened, Void
 from gestured.core.hub import Hub
+from gestured.core.sensor import Sensor
+from gestured.core.stamping import Stamp, Stamper
+from gestured.core.wire import Decoder
 from gestured.daemon.asked import scene_of
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder
 from gestured.record import tape as mcap
-from gestured.record.replay import Replay, maker, opened
+from gestured.record.replay import Mute, Replay, maker, opened
 from tests.golden.tape import Packet, Tape, arrived
 
 Line = dict[str, Any]
@@ -117,3 +124,49 @@ def recorded(file: Path) -> Tape:
     settings = {key: value for key, value in found.scene["settings"].items() if key not in OUTSIDE}
     packets = (Packet(p.t_ns, tuple(p.source), p.data) for p in found.packets)
     return arrived(file.stem, f"recorded with {made.models[0]}", packets, settings)
+
+
+def front_ends(tape: Tape) -> Iterator[tuple[str, FrontEnd, Stamp, list[tuple[int, Found]]]]:
+    """Each sensor's front end after each of its frames, with the frame's stamp, and what it found, with contacts' ids.
+
+    Whoever sends may feed every sensor. A dropped frame is passed over, but its stamp is given.
+    """
+    settings = Settings.model_validate(dict(tape.settings))
+    gestures = ("double_tap",) if settings.gestures is None else settings.gestures
+    scene = scene_of(settings, SimpleNamespace(gestures=gestures, rows=9, columns=9))  # type: ignore[arg-type]
+    decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=True)
+    sensors: dict[str, tuple[Stamper, FrontEnd]] = {}
+    numbers: Counter[str] = Counter()
+    for now, waiting in tape.steps():
+        arrived: dict[str, list[Any]] = {}
+        for packet, source in waiting or ():
+            for arrival in decoder.decode(packet, source)[0]:
+                arrived.setdefault(arrival.sensor, []).append(arrival)
+        for name, arrivals in arrived.items():
+            if name not in sensors:
+                sensors[name] = Stamper(scene.clock_of(name)), Sensor(name, scene, Mute(scene.gestures)).front_end
+            stamper, front_end = sensors[name]
+            for arrival, stamp in zip(arrivals, stamper.stamp(arrivals, now), strict=True):
+                found: list[tuple[int, Found]] = []
+                if not stamp.dropped:
+                    each = front_end.reset() if stamp.restarted else []
+                    each += front_end.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
+                    for one in each:
+                        numbers[name] += isinstance(one, Opened)
+                        if not isinstance(one, Segment):
+                            found.append((numbers[name], one))
+                yield name, front_end, stamp, found
+
+
+def contact_line(sensor: str, number: int, found: Opened | Void | Ended) -> Line:
+    """What a front end found of a contact, as the event that is made of it."""
+    if isinstance(found, Opened):
+        return as_line(Onset(sensor, number, found.onset))
+    if isinstance(found, Void):
+        return as_line(Cancelled(sensor, number, found.reason))
+    return as_line(Release(sensor, number, found.offset))
+
+
+def window(segment: Segment, model: Ladder) -> Any:
+    """A segment as the model takes it."""
+    return model.model.metadata.window.apply(segment)

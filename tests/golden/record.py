@@ -1,7 +1,7 @@
 """Record what the golden tapes give now: `python -m tests.golden.record`, or of some: `... record faults stalls_long`.
 
 With `--add TAPE.mcap` what `gesturectl record` has written is kept as one more tape of the group. Look at `git diff`
-afterwards: each line that changed is an event that a user gets differently.
+afterwards: each line that changed is an event, or a segment, that a user gets differently.
 """
 
 import argparse
@@ -12,7 +12,7 @@ from collections import Counter
 from pathlib import Path
 
 from gestured.daemon import log
-from tests.golden import expected, path, tape
+from tests.golden import expected, path, segments, tape
 from tests.golden.real import SESSIONS, real
 from tests.golden.tape import GROUPS
 
@@ -39,8 +39,10 @@ def main() -> int:
             continue
         for one in real() if group == "real" else tape.read(group):
             lines = path.play(one, model)
-            size += _keep(group, one, expected.written(one, lines))
+            size += _keep(group, one, "events", expected.written(one, lines))
             events = Counter(line["type"] for line in lines if "at" in line)
+            if group in expected.SEGMENTS:
+                size += _keep(group, one, "segments", expected.written(one, segments.found(one, model)))
             print(f"  {len(one.packets)} packets, {events.total()} events")
             kinds += events
             number += 1
@@ -50,9 +52,9 @@ def main() -> int:
     return 0
 
 
-def _keep(group: str, one: tape.Tape, text: str) -> int:
+def _keep(group: str, one: tape.Tape, kind: str, text: str) -> int:
     """Write a file, and say whether it has changed."""
-    file = expected.path_of(group, one)
+    file = expected.path_of(group, one, kind)
     before = file.read_text() if file.exists() else None
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text)

@@ -5,13 +5,13 @@ anew, and their diff is reviewed.
 """
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import pytest
 
 from gestured.model.ladder import Ladder
-from tests.golden import expected, path, tape
+from tests.golden import expected, path, segments, tape
 from tests.golden.path import Line
 from tests.golden.real import SESSIONS, real
 from tests.golden.tape import GROUPS, Tape
@@ -34,25 +34,32 @@ def some(groups: Iterable[str], long: Iterable[str]) -> list[Any]:
     return [pytest.param(group, marks=pytest.mark.hostile if group in long else ()) for group in groups]
 
 
-def check(group: str, tapes: list[Tape], model: Ladder) -> None:
-    """Tape by tape: fail with all that differs."""
-    exact, changed = expected.same_machine(group), list[str]()
+def changes(group: str, tapes: list[Tape], kind: str, lines_of: Callable[[Tape], list[Line]]) -> Iterator[str]:
+    """What differs, tape by tape."""
+    exact = expected.same_machine(group)
     for one in tapes:
-        file = expected.path_of(group, one)
-        if found := expected.difference(file.read_text(), expected.written(one, path.play(one, model)), exact):
-            changed.append(f"{group}, {one.name!r} ({file.name}): {found}")
-    assert not changed, "\n".join(changed)
+        file = expected.path_of(group, one, kind)
+        if found := expected.difference(file.read_text(), expected.written(one, lines_of(one)), exact):
+            yield f"{group}, {one.name!r} ({file.name}): {found}"
 
 
 @pytest.mark.parametrize("group", some(GROUPS, {"stalls_long"}))
 def test_the_daemon_publishes_the_same_events(group: str, model: Ladder) -> None:
-    check(group, tape.read(group), model)
+    found = list(changes(group, tape.read(group), "events", lambda one: path.play(one, model)))
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("group", some(expected.SEGMENTS, {*expected.SEGMENTS} - {"counters"}))
+def test_segments_are_the_same(group: str, model: Ladder) -> None:
+    found = list(changes(group, tape.read(group), "segments", lambda one: segments.found(one, model)))
+    assert not found, "\n".join(found)
 
 
 @pytest.mark.hostile
 @pytest.mark.skipif(not SESSIONS.exists(), reason=f"there are no recordings of real fingers at {SESSIONS}")
 def test_real_fingers_give_the_same_events(model: Ladder) -> None:
-    check("real", real(), model)
+    found = list(changes("real", real(), "events", lambda one: path.play(one, model)))
+    assert not found, "\n".join(found)
 
 
 @pytest.mark.parametrize("group", some(GROUPS, {*GROUPS} - {"counters"}))
@@ -87,7 +94,7 @@ def test_the_tapes_hold_every_answer_and_every_reason() -> None:
     assert reasons == {"held", "silence", "restart", "glitch", "stuck", "refractory"}
 
 
-EVENT = {"at": 0.1, "type": "Unknown", "confidence": 0.25, "onset": 0.3, "scores": {"one_tap": 0.5}}
+EVENT = {"at": 0.1, "type": "Unknown", "confidence": 0.25, "onset": 0.3, "scores": {"one_tap": 0.5}, "looks": "ab"}
 
 
 @pytest.mark.parametrize(
@@ -102,6 +109,7 @@ EVENT = {"at": 0.1, "type": "Unknown", "confidence": 0.25, "onset": 0.3, "scores
         ({"scores": {"one_tap": 0.50001}}, True, False),
         ({"scores": {"one_tap": 0.501}}, True, True),
         ({"confidence": 0.25000000000000006}, True, False),
+        ({"looks": "cd"}, True, False),
     ],
 )
 def test_a_difference_is_noticed(changed: Line, here: bool, elsewhere: bool) -> None:
