@@ -188,7 +188,7 @@ def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title
     others = multiprocessing.active_children()
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         workers = [process for process in multiprocessing.active_children() if process not in others]
-        made = pool.imap(make, todo, chunksize=max(1, min(50, len(todo) // (4 * jobs))))
+        made = pool.imap(make, todo)  # in chunks it would give a generator, which knows no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)
 
 

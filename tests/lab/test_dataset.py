@@ -163,6 +163,10 @@ def test_no_more_processes_start_than_there_are_pieces_of_work() -> None:
     assert (next(made), len(multiprocessing.active_children())) == (0, 2)
 
 
+def test_what_is_made_of_many_comes_in_order() -> None:
+    assert list(in_processes(abs, range(100), 2, "")) == list(range(100))
+
+
 def killed(number: int) -> int:
     """The work of a process that the system kills, as where memory runs out."""
     if number == 1:
