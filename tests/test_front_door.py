@@ -87,6 +87,7 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"zones": [("seat", (0, 0, 1, 1))]}, "zones: expected four numbers for each name, found .*seat"),
         ({"arming": {"by": "one_tap", "seconds": 10**400}}, "too large"),
         ({"own_gestures": "none.json"}, r"none\.json: cannot be read: No such file"),
+        ({"own_gestures": "n" * 300}, "nnn: cannot be read: File name too long"),
     ],
 )
 def test_a_mistake_in_opening_is_one_sentence(shelf: Path, wrong: dict[str, Any], words: str):

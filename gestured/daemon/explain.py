@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from gestured import __version__
 from gestured.client.address import control_beside, default_socket
-from gestured.core.errors import ModelError, SettingsError
+from gestured.core.errors import ModelError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.daemon.asked import open_ladder, outputs_of, scene_of
 from gestured.daemon.client import BACKLOG_BYTES
@@ -50,12 +50,13 @@ def _models(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _own(settings: Settings, ladder: Ladder) -> Said:
-    """Which own gestures are loaded, and why none can be enrolled. Raises SettingsError for a path that cannot be."""
+    """Which own gestures are loaded, or why the daemon goes on without them, and why none can be enrolled."""
     own = own_file.load(own_file.where(settings.own_gestures, os.environ))
-    if own.fault and settings.own_gestures:
-        raise SettingsError(f"own_gestures: {own.fault}")
     if own.fault or own.path is None:
-        yield LEAVES, f"enrolling: {own.fault or own_file.NO_FILE}"
+        yield LEAVES, f"own gestures: {own.fault or own_file.NO_FILE}"
+        return
+    if ladder.model.space is None:
+        yield LEAVES, f"own gestures: {ladder.active} has no embedding"
         return
     yield LOADS, f"own gestures {', '.join(own.gestures) or '(none yet)'}, in {own.path}"
     # Folders that are missing are made when something is enrolled.

@@ -204,11 +204,11 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
 
 def _own(ladder: Ladder, path: Path) -> Own:
     """The gestures of a file, for a model that can compare them."""
-    if not path.exists():
-        raise OwnFileError(f"{path}: cannot be read: {os.strerror(errno.ENOENT)}")
     found = own_file.load(path)
     if found.fault is not None:
         raise OwnFileError(found.fault)
+    if not found.sha256:  # a daemon makes the file that it was told; a program that names one expects its gestures
+        raise OwnFileError(f"{path}: cannot be read: {os.strerror(errno.ENOENT)}")
     if ladder.model.space is None and not ladder.degraded:
         raise SettingsError(f"own_gestures: {ladder.name} has no embedding, expected a model that was made for them")
     return ladder.compared(found.gestures)
