@@ -62,9 +62,10 @@ class TuioSink(UdpOut):
             self._bundle(event.sensor, cursors[key], event)
 
     def take_over(self, before: UdpOut) -> None:
-        """Count on: a client takes frames with numbers below those it has seen for late ones, and drops them."""
+        """Go on with the same fingers and numbers: a client drops frames with numbers below those it has seen."""
         if isinstance(before, TuioSink) and before.destination == self.destination:
             self._sources, self._sessions = before._sources, before._sessions
+            before._sources = {}
 
     def close(self) -> None:
         """Say that no finger is there any more, then close the socket."""
