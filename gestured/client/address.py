@@ -5,6 +5,7 @@ import os
 import socket
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from gestured.core.address import Address
 from gestured.core.errors import SettingsError
@@ -85,6 +86,16 @@ def running() -> list[Path]:
         return []
     listening = {Path(row[7]) for row in rows if len(row) == 8 and row[3] == LISTENS}
     return sorted(path for path in listening if path.suffix == ".ctl" and path.with_suffix(".sock") in listening)
+
+
+def look_up(address: tuple[str, int], kind: int) -> tuple[int, Any]:
+    """(family, socket address) of a host and port; blocks while a name is looked up. Raises OSError.
+
+    A name that is this machine by both families, as `localhost` may be, is 127.0.0.1, where most programs listen.
+    """
+    found = socket.getaddrinfo(*address, type=kind)
+    family, _, _, _, where = next((one for one in found if one[4][0] == "127.0.0.1"), found[0])
+    return family, where
 
 
 def bind_failure(error: OSError, address: Address, kind: int) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client import osc_out
+from gestured.client.address import look_up
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame, Touch
@@ -61,8 +62,8 @@ class Form:
 def connected(to: tuple[str, int]) -> socket.socket:
     """A UDP socket that sends to an address. Raises GesturedError where it is none."""
     try:
-        family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-        sock = socket.socket(family, kind)
+        family, where = look_up(to, socket.SOCK_DGRAM)
+        sock = socket.socket(family, socket.SOCK_DGRAM)
         sock.connect(where)
     except OSError as error:
         raise GesturedError(f"cannot send to {Address(*to)}: {error.strerror or error}") from None

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from functools import partial
 
-from gestured.client.address import bind_failure
+from gestured.client.address import bind_failure, look_up
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands, on_stop
@@ -121,8 +121,8 @@ def _remarks(seen: Seen) -> Iterator[str]:
 
 def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, bytes]]:
     try:
-        family, kind, _, _, where = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
-        receiver = socket.socket(family, kind)
+        family, where = look_up(address, socket.SOCK_DGRAM)
+        receiver = socket.socket(family, socket.SOCK_DGRAM)
         receiver.bind(where)
     except OSError as error:
         hint = "; without --listen I ask the daemon that has it" if error.errno == errno.EADDRINUSE else ""

@@ -7,12 +7,13 @@ import threading
 import time
 from typing import Protocol
 
+from gestured.client.address import look_up
 from gestured.core.address import Address
 from gestured.core.beside.reading import SILENT
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
 from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.sockets import reason_of, resolve
+from gestured.daemon.sockets import reason_of
 
 LOOK_UP_S = 5.0  # from one look-up of a destination that was not found to the next
 
@@ -50,7 +51,7 @@ class UdpOut(Sink):
     def _look_up(self) -> None:
         """Find the destination, which may block for seconds; any thread may."""
         try:
-            family, self._where = resolve(self.destination, socket.SOCK_DGRAM)
+            family, self._where = look_up(self.destination, socket.SOCK_DGRAM)
             self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         except OSError as error:
             reason = error.strerror or reason_of(error)

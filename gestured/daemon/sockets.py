@@ -8,9 +8,8 @@ import stat
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-from gestured.client.address import SOCKET_PATH_BYTES, bind_failure
+from gestured.client.address import SOCKET_PATH_BYTES, bind_failure, look_up
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
@@ -26,15 +25,9 @@ class AddressError(GesturedError):
     """An address or a socket that cannot be bound."""
 
 
-def resolve(address: Address, kind: int) -> tuple[int, Any]:
-    """(family, socket address) of a host and port; blocks while a name is looked up. Raises OSError."""
-    family, _, _, _, where = socket.getaddrinfo(address.host, address.port, type=kind)[0]
-    return family, where
-
-
 def _bind(key: str, address: Address, kind: int) -> socket.socket:
     try:
-        family, where = resolve(address, kind)
+        family, where = look_up(address, kind)
         sock = socket.socket(family, kind | socket.SOCK_NONBLOCK)
     except OSError as error:
         raise AddressError(f"{key}: cannot use {address}: {error.strerror}") from error

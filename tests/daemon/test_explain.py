@@ -50,7 +50,9 @@ def test_a_tap_is_answered_when_explain_says(tap_gap_s: float) -> None:
 def test_the_file_of_own_gestures_is_said_and_why_the_daemon_goes_on_without_one(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def explained(*flags: object, model: Path = tiny_model.make(tmp_path / "tiny.onnx", own=tiny_model.own())) -> str:
+    able = tiny_model.make(tmp_path / "tiny.onnx", own=tiny_model.own())
+
+    def explained(*flags: object, model: Path = able) -> str:
         return explain(*settings_of("--model", model, *flags))
 
     path = tmp_path / "missing" / "own.json"

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from pythonosc.osc_message import OscMessage
 
+from gestured.client.address import look_up
 from gestured.core.address import Address
 from gestured.core.events import Status
 from gestured.daemon import sinks
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.sockets import resolve
 from tests.daemon.harness import DEADLINE_S
 
 
@@ -19,15 +19,15 @@ def test_a_destination_whose_name_is_not_known_yet_is_looked_up_again(
     udp: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As at the start of a machine, whose network comes later than we do."""
-    known = resolve(Address(*udp.getsockname()), socket.SOCK_DGRAM)
+    known = look_up(Address(*udp.getsockname()), socket.SOCK_DGRAM)
     found: list[Any] = [socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")] * 2 + [known]
 
-    def look_up(*_: object) -> Any:
+    def later(*_: object) -> Any:
         if isinstance(one := found.pop(0) if found else known, OSError):
             raise one
         return one
 
-    monkeypatch.setattr(sinks, "resolve", look_up)
+    monkeypatch.setattr(sinks, "look_up", later)
     monkeypatch.setattr(sinks, "LOOK_UP_S", 0.0)
     metrics = Metrics()
     sink = sinks.OscSink(Address("display.local", 9001), metrics)
@@ -36,3 +36,11 @@ def test_a_destination_whose_name_is_not_known_yet_is_looked_up_again(
         sink.publish(Status("ok", {}, "tiny", 0.0), 0.0)
     assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values["unresolved",] > 0
     sink.close()
+
+
+def test_localhost_by_both_families_is_where_most_programs_listen(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = [(socket.AF_INET6, 2, 17, "", ("::1", 9001, 0, 0)), (socket.AF_INET, 2, 17, "", ("127.0.0.1", 9001))]
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: both)
+    assert look_up(Address("localhost", 9001), socket.SOCK_DGRAM) == (socket.AF_INET, ("127.0.0.1", 9001))
+    del both[1:]
+    assert look_up(Address("localhost", 9001), socket.SOCK_DGRAM) == (socket.AF_INET6, ("::1", 9001, 0, 0))

@@ -7,6 +7,7 @@ from collections import deque
 
 import numpy as np
 
+from gestured.client.address import look_up
 from gestured.client.say import shown
 from gestured.core.address import Address
 from gestured.core.beside.reading import Reading
@@ -54,8 +55,8 @@ class LiveSensor:
         self._heard = time.monotonic()
         self._wrong = ""
         try:
-            family, kind, _, _, where = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
-            self.socket = socket.socket(family, kind | socket.SOCK_NONBLOCK)
+            family, where = look_up(address, socket.SOCK_DGRAM)
+            self.socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
             self.socket.bind(where)
         except OSError as error:
