@@ -11,6 +11,7 @@ from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.record import Keeper
+from gestured.core.errors import GesturedError
 from gestured.record.tape_writer import Writer
 
 LIMIT_BYTES = 2 << 30  # more than the ring may hold
@@ -55,8 +56,11 @@ def flag(control: Control, path: Path, note: str) -> Keeper:
     scene = control.ask("flight")
     with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape, control.reading():
         keeper = Keeper(tape, scene)
-        for line in control.lines():
-            if line["type"] == "end":
-                return keeper
-            keeper.keep(line)
+        try:
+            for line in control.lines():
+                if line["type"] == "end":
+                    return keeper
+                keeper.keep(line)
+        except KeyboardInterrupt:
+            raise GesturedError(f"ended before all was written; {path} is not complete") from None
     raise Unreachable(f"the daemon closed the connection; {path} is not complete")

@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from gestured.client.address import SYSTEM, control_beside, running
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
-from gestured.client.say import say, say_drawn, say_json, tell
+from gestured.client.say import say, say_drawn, tell
 from gestured.control.address import add_sockets, connect
 from gestured.core.beside.reading import SILENT
 from gestured.core.errors import GesturedError
@@ -45,30 +46,31 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print once, or again and again."""
-    if args.all:
-        return all_of_them(args)
-    with connect(args) as control:
+    with nullcontext() if args.all else connect(args) as control:
         while True:
-            status = control.ask("status")
-            with control.reading():
-                lines, ready = [] if args.json else list(screen(status)), status["ready"]["ready"]
-            if args.json:
-                say_json(status)
-            else:
-                if args.watch and sys.stdout.isatty():
-                    say_drawn(CLEAR, end="")
-                say(*lines)
+            status = every(args) if control is None else one(args, control)
             if not args.watch:
-                return 0 if ready else 1
+                return status
             time.sleep(REFRESH_S)
 
 
-def all_of_them(args: argparse.Namespace) -> int:
+def one(args: argparse.Namespace, control: Control) -> int:
+    """Print how one daemon is; 1 where it is not ready."""
+    status = control.ask("status")
+    with control.reading():
+        lines, ready = [] if args.json else list(screen(status)), status["ready"]["ready"]
+    _clear(args)
+    tell(args.json, status, *lines)
+    return 0 if ready else 1
+
+
+def every(args: argparse.Namespace) -> int:
     """Print a line for each daemon; 1 where one is not ready, does not answer, or there is none."""
     installed = control_beside(SYSTEM)  # which has a network of its own, and so is not in the kernel's table of ours
     paths = sorted({*running(), *([installed] if os.path.exists(installed) else [])})
     if not paths:
         raise Unreachable("no daemon runs on this machine")
+    _clear(args)
     bad = 0
     if not args.json:
         say("control socket                       state        sensors    frames/s  gestures   dropped  load")
@@ -85,6 +87,12 @@ def all_of_them(args: argparse.Namespace) -> int:
         bad += not ready
         tell(args.json, {"control": str(path), **status}, line)
     return 1 if bad else 0
+
+
+def _clear(args: argparse.Namespace) -> None:
+    """Have what is watched begin at the top of a terminal."""
+    if args.watch and not args.json and sys.stdout.isatty():
+        say_drawn(CLEAR, end="")
 
 
 def summary(path: Path, status: dict[str, Any]) -> str:

@@ -20,6 +20,19 @@ def test_each_daemon_that_runs_is_shown_wherever_its_socket_is(run, serve) -> No
     assert line.split()[1] == "no_data"
 
 
+def test_all_are_watched_until_ctrl_c(run, daemon: Daemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses = iter(range(2))
+
+    def pause(seconds: float) -> None:
+        if next(pauses, None) is None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("time.sleep", pause)
+    status, out, _ = run("status", "--all", "--watch", "--json")
+    told = [json.loads(line)["control"] for line in out.splitlines()]
+    assert (status, told.count(daemon.ready["control"])) == (0, 3)
+
+
 def test_one_that_does_not_answer_and_none_at_all_are_said(
     run, fake_control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gestured.control.diff import Answer, Difference, differences
+from gestured.control.record import Keeper
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
@@ -141,6 +142,16 @@ def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path
     assert "swipe_left" in {e.get("gesture") for e in found.events}
     status, _, err = run("replay", path, "--diff", "--model", found.scene["settings"]["model"])
     assert status in (0, 1) and "differences" in err
+
+
+def test_a_flag_that_is_ended_early_says_so(ctl, daemon: Daemon, tmp_path: Path, monkeypatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    gestures(daemon, "early", "left")()
+    monkeypatch.setattr(Keeper, "keep", interrupted)
+    status, _, err = ctl("flag", tmp_path / "wrong.mcap")
+    assert (status, err) == (1, f"gesturectl: ended before all was written; {tmp_path}/wrong.mcap is not complete\n")
 
 
 def test_two_flags_of_one_second_have_names_of_their_own(ctl, tmp_path: Path, monkeypatch) -> None:
