@@ -4,19 +4,23 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from itertools import accumulate
+from operator import attrgetter
 from typing import NamedTuple
 
 from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
+LIGHT_BYTES = 4 << 10  # that an owner of a sensor may send in a turn of a flood, to be served together with others
 GROUP, GROUP_BYTES = 256, 128 << 10  # packets, and bytes of several packets, in one go at the most
 ROOM_BYTES = 52 << 10  # a quarter of the smallest buffer that a kernel grants
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
 FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
 OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
-CREDIT_S = 0.02  # s of work that a sender may save up and begins with: the price of the largest packet of frames
+# s of work that a sender may save up and begins with, for each sensor that it owns: the price of the largest packet of
+# frames.
+CREDIT_S = 0.02
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
 NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
 REMEMBERED_SENDERS = 4096  # senders whose costs and credit are remembered in a flood
@@ -31,13 +35,12 @@ class Datagram(NamedTuple):
     arrival: float  # s, monotonic
     packet: bytes
     source: Source
-    cost: float  # s of work, probably; no more than a sender can save up, so that anybody is served in the end
+    cost: float  # s of work, probably; no more than anybody can save up, so that all are served in the end
 
 
 class Group(NamedTuple):
-    """Packets of one sender that arrived together, as they are served in a flood."""
+    """Packets that arrived together, as they are served in a flood: of one sender, or a few of each of several."""
 
-    sender: Sender
     packets: list[Packet]
     arrival: float  # s, monotonic, of the last of them
 
@@ -51,9 +54,9 @@ class Backlog:
     they open.
     """
 
-    def __init__(self, owns: Callable[[Source], bool]) -> None:
-        """`owns` says whether a source owns a sensor."""
-        self._owns = owns
+    def __init__(self, owned: Callable[[Source], int]) -> None:
+        """`owned` says how many sensors a source owns."""
+        self._owned = owned
         self._packets: list[Packet] = []
         self._arrivals: list[float] = []  # s, of each
         self._bytes = 0
@@ -140,36 +143,42 @@ class Backlog:
         before = self._equal
         self._equal += min((shares[key] for key in owners), default=OWNERS_SHARE * seconds)
         self._turns = min(self._turns + seconds, CREDIT_S)
+        light: list[Datagram] = []
         served: list[Group] = []
         dropped: dict[Sender, list[bytes]] = {}
         for key in sorted(by_sender, key=needs.__getitem__):
             kept = self._newest(key, by_sender[key], shares[key], before, seconds)
-            served += _groups(key, kept)
+            if key in owners and sum([len(each.packet) for each in kept]) <= LIGHT_BYTES:
+                light += kept
+            else:
+                served += _groups(kept)
             if left := by_sender[key][: len(by_sender[key]) - len(kept)]:
                 dropped[key] = [datagram.packet for datagram in left]
         if dropped:
             self.flood(now + FLOOD_S)
-        return served, dropped
+        return _groups(sorted(light, key=attrgetter("arrival"))) + served, dropped
 
     def took(self, group: Group, seconds: float) -> None:
         """A group of a flood was served, and cost so much."""
-        key, size = group.sender, sum([len(packet) for packet, _ in group.packets])
+        size = sum([len(packet) for packet, _ in group.packets])
         cost = seconds / size if size else 0.0
-        if len(self._cost) < REMEMBERED_SENDERS or key in self._cost:
-            before = self._cost.get(key, cost)
-            self._cost[key] = before + NEWEST * (cost - before)
+        for key in {self.sender(source) for _, source in group.packets}:
+            if len(self._cost) < REMEMBERED_SENDERS or key in self._cost:
+                before = self._cost.get(key, cost)
+                self._cost[key] = before + NEWEST * (cost - before)
 
     def sender(self, source: Source) -> Sender:
         """As whom a source counts: for itself where it owns a sensor, else as its host."""
-        return source if self._owns(source) else source[0]
+        return source if self._owned(source) else source[0]
 
     def _newest(
         self, key: Sender, datagrams: list[Datagram], share: float, before: float, seconds: float
     ) -> list[Datagram]:
-        credit, equal = self._credit.get(key, (CREDIT_S, before))
+        most = CREDIT_S * (self._owned(key) if isinstance(key, tuple) else 1)
+        credit, equal = self._credit.get(key, (most, before))
         if isinstance(key, tuple):
             credit += before - equal  # turns in which it sent nothing; a stranger that pauses has earned nothing
-        credit = min(credit + share, max(share, CREDIT_S))
+        credit = min(credit + share, max(share, most))
         kept: list[Datagram] = []
         for datagram in reversed(datagrams):
             cost = datagram.cost
@@ -184,14 +193,14 @@ class Backlog:
         return kept[::-1]
 
 
-def _groups(sender: Sender, datagrams: Sequence[Datagram]) -> list[Group]:
+def _groups(datagrams: Sequence[Datagram]) -> list[Group]:
     """What a sender sent, oldest first, in groups: that a frame costs less beside others holds in a flood, too."""
     groups: list[list[Datagram]] = []
     for datagram in datagrams:
         if not groups or datagram.arrival - groups[-1][0].arrival >= TOGETHER_S:
             groups.append([])
         groups[-1].append(datagram)
-    return [Group(sender, [(packet, source) for _, packet, source, _ in some], some[-1].arrival) for some in groups]
+    return [Group([(packet, source) for _, packet, source, _ in some], some[-1].arrival) for some in groups]
 
 
 def fair(needs: dict[Sender, float], seconds: float) -> dict[Sender, float]:

@@ -13,6 +13,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Receiver:
         """Give `hub` the packets since the socket was `empty` (s), and its facts to `desk`; `taps` see the packets."""
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
-        self._backlog = Backlog(lambda source: source in hub.owners)
+        self._backlog = Backlog(lambda source: hub.owners.get(source, 0))
         self._muted = Muted()
         _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
         self._empty = empty  # s: what arrived until then was read
@@ -192,8 +193,8 @@ class Receiver:
         start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
         for n, group in enumerate(served):
             if before > start + TURN_S:
-                for left in served[n:]:
-                    dropped.setdefault(left.sender, []).extend(packet for packet, _ in left.packets)
+                for packet, source in chain.from_iterable(left.packets for left in served[n:]):
+                    dropped.setdefault(self._backlog.sender(source), []).append(packet)
                 break
             self._serve(group.packets, group.arrival)
             after = time.thread_time()

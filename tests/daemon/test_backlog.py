@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from gestured.daemon.backlog import CREDIT_S, FLOOD_S, GROUP, GROUP_BYTES, MOST_BYTES, TOGETHER_S, Backlog, fair
 
-ARM, SEAT, STRANGER = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.9", 1)
-OWNERS = {ARM, SEAT}
+ARM, SEAT, BUSY, STRANGER = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.1", 3), ("10.0.0.9", 1)
+OWNERS = {ARM, SEAT, BUSY}
 FRAME = bytes(400)
 
 
@@ -135,15 +135,23 @@ def test_the_newest_of_what_is_too_much_is_served() -> None:
     assert found and found == list(range(1000 - len(found), 1000))
 
 
-def test_in_a_flood_what_a_sender_sent_together_is_served_together() -> None:
+def test_in_a_flood_what_owners_send_together_is_served_together_before_who_sends_much() -> None:
     waiting = backlog()
-    arrivals = [0.0, TOGETHER_S / 2, 1.0, 1.0]
-    waiting.add([(b"%d" % n, ARM if n < 3 else STRANGER) for n in range(4)], arrivals)
-    groups, _ = waiting.share(0.001, 1.0)
-    assert sorted((group.sender, [packet for packet, _ in group.packets], group.arrival) for group in groups[1:]) == [
-        (ARM, [b"0", b"1"], TOGETHER_S / 2), (ARM, [b"2"], 1.0),
-    ]  # fmt: skip
-    assert groups[0] == (STRANGER[0], [(b"3", STRANGER)], 1.0)
+    much = [bytes(3000)] * 2
+    sent = [(0.0, b"0", ARM), (0.0, b"1", SEAT), (TOGETHER_S / 2, b"2", ARM), (1.0, b"3", SEAT), (1.0, b"4", STRANGER)]
+    sent += [(1.0, packet, BUSY) for packet in much]
+    waiting.add([(packet, source) for _, packet, source in sent], [arrival for arrival, _, _ in sent])
+    groups, _ = waiting.share(0.01, 1.0)
+    served = [([packet for packet, _ in group.packets], group.arrival) for group in groups]
+    assert served == [([b"0", b"1", b"2"], TOGETHER_S / 2), ([b"3"], 1.0), ([b"4"], 1.0), (much, 1.0)]
+
+
+def test_a_source_of_many_sensors_has_saved_up_for_each_of_them() -> None:
+    for sensors in (1, 300):
+        waiting = Backlog(lambda source, sensors=sensors: sensors)
+        waiting.add([(FRAME, ARM)] * 300, [0.0] * 300)
+        groups, dropped = waiting.share(0.001, 0.0)
+        assert bool(dropped) == (sensors == 1)
 
 
 def test_a_packet_that_costs_more_than_a_turn_has_its_turn_in_the_end() -> None:

@@ -250,23 +250,29 @@ class Learns(Machine):
     """A machine on which a sensor's first frames are dear, and later ones cheap where several are served together."""
 
     def __init__(self, sent: Iterable[Sent]) -> None:
-        super().__init__(sent, lambda packet: 3e-5)
+        super().__init__(sent, lambda packet: 2e-5)
         self.seen: Counter[bytes] = Counter()
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
         known = sum(self.seen[packet] >= 15 for packet, _ in packets)
-        self.work(7e-4 * (len(packets) - known) + (2e-3 if known >= 6 else 5e-4 * known))
+        self.work(7e-4 * (len(packets) - known) + 5e-4 * (known > 0))
         self.seen.update(packet for packet, _ in packets)
         return super().receive(packets, now)
 
 
-def test_a_source_of_many_sensors_is_followed_again_once_they_are_known() -> None:
-    """Until then they come to three times the work that there is time for, and later to half of it."""
-    frames = [(0.01 + n / 15 + k / 4500, b"%3d" % k * 130, ("10.0.0.1", 1)) for n in range(180) for k in range(300)]
+@pytest.mark.parametrize("ports", [1, 20, 600])
+def test_many_sensors_are_followed_again_once_they_are_known(ports: int) -> None:
+    """Until then they come to six times the work that there is time for, and later to a third of it.
+
+    One by one they would still come to five times of it.
+    """
+    frames = [
+        (0.01 + n / 15 + k / 9000, b"%3d" % k * 130, ("10.0.0.1", k % ports)) for n in range(165) for k in range(600)
+    ]
     machine = Learns(frames)
-    machine.each = 300
-    run(machine, 12.5)
-    assert set(Counter(packet for packet, _ in machine.served[-3 * 4500 :]).values()) == {45}
+    machine.each = 600 // ports
+    run(machine, 11.5)
+    assert set(Counter(packet for packet, _ in machine.served[-2 * 9000 :]).values()) == {30}
 
 
 @pytest.mark.parametrize("look_s", [0.0003, 0.0015, 0.012])
