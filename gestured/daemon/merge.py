@@ -107,7 +107,7 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
         near = _near(str(place[-1]), known)
         hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
         said = f"unknown key, {hint}"
-    elif problem["type"] == "model_type":
+    elif problem["type"] in ("model_type", "dict_type"):
         said = f"expected a table [{key}]"
     else:
         said = expected(problem)

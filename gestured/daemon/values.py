@@ -12,6 +12,15 @@ from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES, named
 from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
+# By pydantic's types of errors, what was expected, where its own words are those of a programmer.
+WORDS = {
+    "tuple_type": "a list",
+    "string_too_short": "a text that is not empty",
+    **dict.fromkeys(("string_type", "string_unicode"), "a text"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "a whole number"),
+}
 
 
 class Destination(NamedTuple):
@@ -26,6 +35,8 @@ class Destination(NamedTuple):
 
 def expected(problem: Mapping[str, Any]) -> str:
     """What was expected, in words that follow a comma or a colon: of one of the `errors()` of a ValidationError."""
+    if words := WORDS.get(problem["type"]):
+        return f"expected {words}"
     ours = problem["type"] == "value_error"
     message: str = problem["msg"].removeprefix("Value error, " if ours else "Input should be ")
     message = message if ours else message[0].lower() + message[1:]

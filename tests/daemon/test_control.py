@@ -63,7 +63,7 @@ def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) ->
         (b"[]\n", ("verb",)),
         (b'{"verb":"launch"}\n', ("verb", '"launch"', "status")),
         (b'{"verb":"emit"}\n', ("emit.gesture", "missing")),
-        (b'{"verb":"emit","gesture":7}\n', ("emit.gesture", "7", "string")),
+        (b'{"verb":"emit","gesture":7}\n', ("emit.gesture", "7", "a text")),
         (b'{"verb":"emit","gesture":"wink"}\n', ("wink", "one_tap")),
         (b'{"verb":"emit","gesture":"one_tap","sensor":"a b"}\n', ("emit.sensor", '"a b"')),
         (b'{"verb":"emit","gesture":"one_tap","loud":true}\n', ("emit", '"loud"', "gesture, sensor")),
