@@ -10,7 +10,7 @@ from gestured.core.scene import DOUBLE_TAP
 from gestured.daemon.asked import open_ladder, outputs_of, scene_of
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
+from gestured.daemon.settings import TABLES, TITLES, Part, Settings, as_written
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
@@ -187,5 +187,4 @@ def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
             for name, part in table.items():
                 yield from (f"{title}.{name}.{field}: {source}" for field in sorted(part.model_fields_set))
         else:
-            table, inner = INSIDE.get(key, (key, ""))
-            yield f"{f'{key}.{inner}' if inner and sources.get(table) == source else key}: {source}"
+            yield f"{as_written(key, sources)}: {source}"

@@ -13,7 +13,7 @@ from typing import Any, get_args, get_origin
 from pydantic import ValidationError
 
 from gestured.core.errors import SettingsError
-from gestured.daemon.settings import FLAGS, INSIDE, TITLES, Part, Settings
+from gestured.daemon.settings import FLAGS, INSIDE, TITLES, Part, Settings, as_written
 from gestured.daemon.values import expected
 from gestured.record.files import open_regular
 
@@ -43,7 +43,7 @@ def _from_file(path: str) -> dict[str, Any]:
         raise SettingsError(f"{name} ({path}): unknown key, expected [{TITLES[name]}]")
     if isinstance(found.get("gestures"), dict):
         tables = found.pop("gestures")
-        if isinstance(tables.get("use"), list):
+        if not isinstance(tables.get("use", {}), dict):
             found["gestures"] = tables.pop("use")
         found["per_gesture"] = tables
     if isinstance(found.get("gates"), dict):
@@ -99,7 +99,7 @@ def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
 def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     place = tuple(part for part in problem["loc"] if part not in ("[key]",))
     source = sources.get(str(place[0]), "default")
-    key = ".".join((TITLES.get(place[0], str(place[0])), *map(str, place[1:])))
+    key = ".".join((as_written(str(place[0]), sources), *map(str, place[1:])))
     if problem["type"] == "missing":
         return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":

@@ -1,5 +1,6 @@
 """What can be set. Every key is described here, and nowhere else: help and documents are made from this."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
@@ -239,3 +240,9 @@ TITLES = {"per_gesture": "gestures", "gate": "gates"}
 INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # those settings: table, and key there
 FLAGS = tuple(name for name in Settings.model_fields if name not in TABLES)
 REPEATED = ("fallback", "publish", "allow")
+
+
+def as_written(key: str, sources: Mapping[str, str]) -> str:
+    """A setting's name as its source has it: in a file with a table of the same name it stands there."""
+    table, inner = INSIDE.get(key, ("", ""))
+    return f"{key}.{inner}" if inner and sources.get(table) == sources.get(key) else TITLES.get(key, key)

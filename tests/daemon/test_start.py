@@ -197,6 +197,8 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ((), {}, f"[sensors.arm.zones]\n{TWO}", ("sensors.arm", "zones.a at", "zones.b at", "overlap, expected")),
         ((), {}, 'socket = "/tmp/\\u0000"', ("socket", "expected the path of a Unix socket")),
         (("--own-gestures", "/"), {}, "", ("own_gestures", "'/'", "expected the path of a file")),
+        ((), {}, "[gestures]\nuse = 5", ("gestures.use = 5", "gestured.toml", "expected a list")),
+        ((), {}, "[gates]\nsocket = 5", ("gates.socket = 5", "gestured.toml", "path of a Unix socket")),
         ((), {}, "[gates]\nstart = 'door'", ("gates.start = 'door'", "expected a list")),
         ((), {}, "[arming]\nby = 5", ("arming.by = 5", "expected a text")),
         ((), {}, "sensors = 5", ("sensors = 5", "expected a table [sensors]")),
@@ -247,6 +249,12 @@ def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) ->
     where = said[said.index("set by:") :].split()
     assert {"gestures.one_tap.threshold:", "sensors.arm.rotate:", "gestures.use:", "stale_s:"} <= set(where)
     assert "per_gesture" not in said
+
+
+def test_gestures_in_use_are_written_alike_with_tables_of_gestures_beside_them(model: Path, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text('[gestures]\nuse = "one_tap, swipe_left"\n')
+    assert "gestures one_tap, swipe_left" in explain(*settings_of("--model", model, "--config", config))
 
 
 def test_settings_that_are_not_valid_end_the_program(model: Path, tmp_path: Path) -> None:
