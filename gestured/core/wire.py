@@ -130,7 +130,7 @@ class _Meaning(NamedTuple):
 class Decoder:
     """Packets in, frames out. `grids` says the grid (R, C) of a sensor, as it is sent.
 
-    Without `keep_touches`, a trajectory is passed over as soon as its address is known.
+    Without `keep_touches`, a trajectory is passed over as soon as its address and its type tags are known.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class Decoder:
                 fault = "types", f"{address}: expected i f f for each touch, found {types[:16]!r}"
             elif len(types) > 3 * MAX_TOUCHES:
                 fault = "too_many_touches", f"{address}: at most {MAX_TOUCHES}, found {len(types) // 3}"
-            return _Route(sensor, None, False, fault if self._keep_touches else None)
+            return _Route(sensor, None, False, fault)
         rows, columns = self._grids(sensor)
         size = rows * columns
         if types in ("f" * size, "i" * size, "b"):

@@ -168,7 +168,7 @@ def _strictness(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _left_out(settings: Settings, ladder: Ladder) -> Said:
-    yield LEAVES, "finger positions (trajectory): nothing uses them, they are passed over at their address"
+    yield LEAVES, "finger positions (trajectory): nothing uses them, they are passed over"
     yield LEAVES, "fallback models: opened when the one above fails"
     yield LEAVES, "torch, scikit-learn: never loaded by the daemon"
     used = gestures_in_use(ladder, settings.gestures)
