@@ -141,6 +141,11 @@ def test_truncated(tmp_path: Path, share: float) -> None:
     wrong(path)
 
 
+def test_a_few_bytes_are_no_digest(tmp_path: Path) -> None:
+    (tmp_path / "note.onnx").write_bytes(b"note")
+    assert "digest" not in wrong(tmp_path / "note.onnx")
+
+
 # --- metadata ---
 
 

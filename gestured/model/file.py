@@ -49,7 +49,7 @@ def has_digest(data: bytes) -> bool:
     end = len(data) - len(DIGEST) - 2 * hashlib.sha256().digest_size
     found = data[max(end, 0) : max(end, 0) + len(DIGEST)]
     # A digest whose own name is damaged is still one; the end of any other entry has hardly a byte in common with it.
-    if sum(one != other for one, other in zip(found, DIGEST, strict=False)) > len(DIGEST) // 2:
+    if sum(one == other for one, other in zip(found, DIGEST, strict=False)) < len(DIGEST) // 2:
         return False
     if data != sealed(data[:end]):
         raise ValueError("is damaged, or was changed after its export: its digest is that of another content")
