@@ -84,8 +84,9 @@ def bind_all(settings: Settings) -> Bound:
         events = _listener(given, "events", path, opened, key="socket")
         path = path or events.path
         beside = settings.control or control_beside(path)
-        if beside == path and "control" not in given:
-            raise AddressError(f"control: {path} is the event socket, choose another path with --control")
+        for name, one, others in (("control", beside, (path,)), ("gates", settings.gates, (path, beside))):
+            if one in others and name not in given:
+                raise AddressError(f"{name}: {one} is another socket of this daemon, choose another path with --{name}")
         control = _listener(given, "control", beside, opened)
         asked = "gates" in given or settings.gates is not None
         gates = _listener(given, "gates", settings.gates, opened) if asked else None

@@ -36,9 +36,18 @@ def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory):
     assert "Traceback" not in daemon.stderr()
 
 
-def test_it_cannot_stand_where_the_event_socket_stands(tmp_path: Path) -> None:
-    with pytest.raises(AddressError, match="a.ctl is the event socket, choose another path with --control"):
-        bind_all(settings_of("--listen", "127.0.0.1:0", "--socket", tmp_path / "a.ctl")[0])
+@pytest.mark.parametrize(
+    ("socket", "gates", "said"),
+    [
+        ("a.ctl", "g", "control: .*a.ctl is another socket of this daemon, choose another path with --control"),
+        ("a.sock", "a.sock", "gates: .*a.sock is another socket of this daemon, choose another path with --gates"),
+        ("a.sock", "a.ctl", "gates: .*a.ctl is another socket of this daemon, choose another path with --gates"),
+    ],
+)
+def test_no_socket_can_stand_where_another_one_stands(tmp_path: Path, socket: str, gates: str, said: str) -> None:
+    flags = ("--listen", "127.0.0.1:0", "--socket", tmp_path / socket, "--gates", tmp_path / gates)
+    with pytest.raises(AddressError, match=said):
+        bind_all(settings_of(*flags)[0])
     assert list(tmp_path.iterdir()) == []
 
 
