@@ -1,7 +1,7 @@
 """What a configuration asks for: its models, opened; its destinations; its scene."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -81,9 +81,11 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
         ladder.report(sentence)
     report_missing_points(ladder, (settings.strictness, *(own.strictness for own in settings.sensors.values())))
     gestures_in_use(ladder, settings.gestures)
-    zones = [zone for sensor in settings.sensors.values() for zone in sensor.zones.values()]
-    named = (*settings.per_gesture, *(name for zone in zones for name in zone.gestures or ()))
-    require_gestures(ladder, (name for name in named if not _may_be_own(name, settings, ladder)))
+    named: dict[str, Iterable[str]] = {"gestures": settings.per_gesture}
+    for name, sensor in settings.sensors.items():
+        named |= {f"sensors.{name}.zones.{zone}.gestures": one.gestures or () for zone, one in sensor.zones.items()}
+    for field, names in named.items():
+        require_gestures(ladder, (name for name in names if not _may_be_own(name, settings, ladder)), field)
     _require_arming(settings, ladder)
     return ladder
 

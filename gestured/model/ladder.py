@@ -206,12 +206,12 @@ def report_missing_points(ladder: Ladder, strictness: Iterable[str | None]) -> N
         ladder.report(f"{ladder.active} has no operating points: whatever the strictness, it takes its one threshold")
 
 
-def require_gestures(ladder: Ladder, names: Iterable[str]) -> None:
-    """Raises SettingsError for a name that is no gesture of the ladder's."""
+def require_gestures(ladder: Ladder, names: Iterable[str], field: str = "gestures") -> None:
+    """Raises SettingsError, which names the `field`, for a name that is no gesture of the ladder's."""
     for name in names:
         if name not in ladder.gestures:
             known = ", ".join(ladder.gestures)
-            raise SettingsError(f"gestures: {name!r} is no gesture of {ladder.name}, expected any of {known}")
+            raise SettingsError(f"{field}: {name!r} is no gesture of {ladder.name}, expected any of {known}")
 
 
 def require_arming(scene: Scene, known: Sequence[str]) -> None:

@@ -263,12 +263,17 @@ def test_settings_that_are_not_valid_end_the_program(model: Path, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("text", "wrong"), [("[gestures.one_tab]\nthreshold = 0.5", "one_tab"), ("gestures = ['wink']", "wink")]
+    ("text", "wrong"),
+    [
+        ("[gestures.one_tab]\nthreshold = 0.5", "gestures: 'one_tab'"),
+        ("gestures = ['wink']", "gestures: 'wink'"),
+        ("sensors.a.zones.v = {at = [0, 0, 1, 1], gestures = ['one_tab']}", "sensors.a.zones.v.gestures: 'one_tab'"),
+    ],
 )
 def test_gestures_that_the_model_does_not_know(model: Path, tmp_path: Path, text: str, wrong: str) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(text)
-    with pytest.raises(SettingsError, match=f"gestures: '{wrong}' is no gesture of tiny, expected any of one_tap"):
+    with pytest.raises(SettingsError, match=f"^{wrong} is no gesture of tiny, expected any of one_tap"):
         explain(*settings_of("--model", model, "--config", config))
 
 
