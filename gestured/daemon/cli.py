@@ -10,8 +10,6 @@ from typing import Any
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
 from gestured.core.points import STRICTNESS
-from gestured.daemon.merge import from_environment, load_settings
-from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
 EXAMPLE = """\
 example:
@@ -38,6 +36,8 @@ OF_TYPE: dict[object, str] = {bool: "true|false", int: "N", float: "SECONDS"}  #
 
 def parser() -> argparse.ArgumentParser:
     """The flags: one for each setting, described by the settings themselves."""
+    from gestured.daemon.settings import FLAGS, REPEATED, Settings
+
     flags = argparse.ArgumentParser(
         prog="gestured",
         description="Recognises touch gestures in pressure frames that arrive by OSC, and publishes them.",
@@ -72,12 +72,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.fstat(number)
         except OSError:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    # Until the loop takes signals: a stop is no failure, and a reload has nothing to reload yet.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # Until the loop takes signals: a stop is no failure, and a reload has nothing to reload yet. What takes long to
+    # import is imported below.
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: sys.exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     given: dict[str, Any] = vars(parser().parse_args(arguments))
     explain = given.pop("explain")
     from gestured.daemon import log
+    from gestured.daemon.merge import from_environment, load_settings
 
     try:
         settings, sources = load_settings(given, os.environ)
@@ -102,8 +105,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except GesturedError as error:
         log.print_log(f"gestured: {error}")
         return 2 if isinstance(error, SettingsError) else 3 if isinstance(error, ModelError) else 4
-    except KeyboardInterrupt:  # before the daemon could take signals itself
-        return 0
     finally:
         log.close()
     return 0

@@ -2,6 +2,8 @@
 
 import signal
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -133,6 +135,18 @@ def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) ->
             assert daemon.process.poll() is None
     assert daemon.stop() == 0
     assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_while_it_imports_its_settings_is_no_failure(number: int) -> None:
+    command = [sys.executable, "-v", "-m", "gestured.daemon", "--listen", "127.0.0.1:0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as starting:
+        assert starting.stderr is not None
+        while not starting.stderr.readline().startswith("import 'pydantic"):
+            assert starting.poll() is None
+        starting.send_signal(number)
+        assert "Traceback" not in starting.stderr.read()
+    assert starting.returncode == 0
 
 
 def test_a_stall_of_the_daemon_is_not_taken_for_silence_of_the_sensor(start, shared: Daemon) -> None:
