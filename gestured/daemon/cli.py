@@ -91,7 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.daemon.explain import explain as describe
 
             try:
-                with open(log.STDOUT, "w", closefd=False) as out:  # Python would try its own again at exit
+                # Python would try its own standard output again at exit, and a path may be no text.
+                with open(log.STDOUT, "w", errors="backslashreplace", closefd=False) as out:
                     print(describe(settings, sources), file=out)
             except BrokenPipeError:
                 pass  # its reader has enough, as `head` does

@@ -240,6 +240,11 @@ def test_what_a_container_platform_sets_by_itself_is_passed_over(start) -> None:
     assert [line["variable"] for line in said] == ["GESTURED_BUILT_BY"]
 
 
+def test_explain_prints_a_path_that_is_no_text(model: Path, tmp_path: Path) -> None:
+    status, out, _ = run("--model", model, "--explain", env={"GESTURED_SOCKET": f"{tmp_path}/\udcff.sock"})
+    assert status == 0 and f"{tmp_path}/\\udcff.sock" in out
+
+
 def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(
