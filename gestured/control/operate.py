@@ -7,6 +7,7 @@ from typing import Any
 
 from gestured.client.program import Commands, Parser
 from gestured.client.say import tell
+from gestured.client.values import number
 from gestured.control.address import add_sockets, connect
 from gestured.control.status import own_faults
 
@@ -83,7 +84,7 @@ def _add_gates(commands: Commands) -> None:
         which.add_argument("--all", action="store_true", help="all sensors, and all that come")
         parser.add_argument("--gate", required=True, metavar="NAME", help="the gate, by a name of your choice")
     text = "seconds after which the gate opens by itself (default: it does not)"
-    inhibit.add_argument("--for", dest="seconds", type=float, metavar="S", help=text)
+    inhibit.add_argument("--for", dest="seconds", type=number(0.001, 1e9), metavar="S", help=text)
     _asks(inhibit, "inhibit", "gate", "sensor", "seconds")
     _asks(allow, "allow", "gate", "sensor")
 

@@ -58,12 +58,18 @@ def test_a_gate_is_closed_and_opened_while_the_daemon_runs(ctl: Ctl, daemon: Dae
         (("inhibit", "elbow", "--gate", "door"), "no sensor 'elbow', expected one of "),
         (("inhibit", "--all", "--gate", "a/b"), "inhibit.gate: expected a gate's name, 1 to 64 of A-Z a-z 0-9 _ -"),
         (("inhibit", "a/b", "--gate", "door"), "inhibit.sensor: expected a sensor's name"),
-        (("inhibit", "--all", "--gate", "door", "--for", "0"), "inhibit.seconds: expected greater than 0, found 0.0"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_one_sentence(ctl: Ctl, daemon: Daemon, arguments: tuple[str, ...], words: str) -> None:
     status, out, err = ctl(*arguments)
     assert status == 1 and words in err and err.count("\n") == 1 and not out
+    assert "door" not in daemon.ask("status")["gates"]
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
+def test_a_time_that_cannot_be_is_a_mistake_of_usage(ctl: Ctl, daemon: Daemon, seconds: str) -> None:
+    status, _, err = ctl("inhibit", "--all", "--gate", "door", f"--for={seconds}")
+    assert status == 2 and f"--for: '{seconds}': expected a number from" in err
     assert "door" not in daemon.ask("status")["gates"]
 
 
