@@ -46,7 +46,7 @@ def cache_folder() -> Path:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Adapt, say what it is worth, and write it where it is better. Exit status 1 where it is not."""
+    """Adapt, say what it is worth, and write it where it is better or `--force` is given; else exit status 1."""
     out: Path = args.out
     if out.suffix != ".onnx":
         raise GesturedError(f"--out: expected a file *.onnx, found {out}")
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         _tell(own, found)
         why = f": {'; '.join(reasons)}" if reasons else ""
         say(f"{out}: {'written' if written else 'not written'}{why}", to=sys.stdout if written else sys.stderr)
-    return 1 if reasons else 0
+    return 0 if written else 1
 
 
 def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
