@@ -13,7 +13,7 @@ from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import write_manifest
 from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
-from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
+from gestured.lab.train import TrainingPlan, load_data, train
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
@@ -54,8 +54,7 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
     found = simulated_figures(paths, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
-    trained = learn(plan, data, args.cache)
-    for name, of in real_figures(trained, calibration_set(trained, data), data).items():
+    for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of
     say(*table(figures))
     write_manifest(args.models, figures)

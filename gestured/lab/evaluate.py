@@ -24,10 +24,12 @@ from gestured.lab.train import (
     Calibrated,
     Trained,
     TrainingData,
+    TrainingPlan,
     calibration_set,
     folds,
     is_of,
     judged,
+    learn,
 )
 from gestured.lab.verifier import Evidence
 from gestured.model.model import Model
@@ -171,16 +173,18 @@ def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> C
     return Calibrated(found, calibrated.labels[keep], calibrated.sets[keep])
 
 
-def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -> dict[str, Any]:
+def real_figures(plan: TrainingPlan, data: TrainingData, cache: Path) -> dict[str, Any]:
     """Real subjects, each by the networks that have not seen them, calibrated without them.
 
-    The first network also before it learned from any real recording, which shows what real recordings bought.
+    The first network also before it learned from any real recording, which shows what real recordings bought. Networks
+    that are not in the cache are trained; where nothing real is to be judged none are needed.
     """
     real = data.real
-    if real is None or trained.held_out is None:
+    if real is None:
         say("real recordings: left out, since no --real FOLDER was named")
         return {}
-    labels = targets(real)
+    trained, labels = learn(plan, data, cache), targets(real)
+    calibrated = calibration_set(trained, data)
     found: dict[str, Any] = {}
     for name in RECURRENT:
         scores = np.zeros((len(real), len(GESTURES)), np.float32)

@@ -1,8 +1,13 @@
 """Figures are counted as a user would count them."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from gestured.lab import commands, evaluate
+from gestured.lab.cli import main
 from gestured.lab.evaluate import outcome, worst
 from gestured.lab.fit import CLASSES
 from gestured.lab.samples import Samples
@@ -93,3 +98,16 @@ def test_the_worst_is_found_among_those_that_are_there_often_enough() -> None:
     assert worst((scores, unknown), samples, 0.5) == {
         "gesture": ("one_tap", 0.667, 30), "person": ("no. 0", 0.645, 31), "non-gesture": ("spike", 0.75, 20),
     }  # fmt: skip
+
+
+def test_without_real_recordings_no_network_is_loaded_or_trained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("open_model", "write_manifest", "write_cards"):
+        monkeypatch.setattr(commands, name, lambda *_: None)
+    monkeypatch.setattr(commands, "load_data", lambda *_: SimpleNamespace(real=None))
+    monkeypatch.setattr(commands, "simulated_figures", lambda *_: {})
+    for module in (commands, evaluate):
+        monkeypatch.setattr(module, "learn", lambda *_: pytest.fail("learns what nothing asks for"), raising=False)
+    assert main(["evaluate", "--cache", str(tmp_path)]) == 0
+    assert "left out, since no --real FOLDER was named" in capsys.readouterr().out
