@@ -18,6 +18,7 @@ from gestured.core.listening import Arming
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import ABSENT_S, Sensor
 from gestured.lab.cli import main
+from gestured.lab.digest import file_digest
 from gestured.lab.everyday import FIRST, command
 from gestured.lab.everyday.hours import FEW, HELD, LEVELS, NOT_READY, RESTARTING, Heard, hear, judged, points_of
 from gestured.lab.everyday.picture import draw
@@ -262,6 +263,19 @@ def test_the_page_and_the_picture_are_written(
     words = {text.text for text in ElementTree.fromstring(curve.read_text()).iter("{http://www.w3.org/2000/svg}text")}
     assert {*LADDER, "normal", "0.5 an hour"} <= words
     assert curve.read_text() == draw(figures([afternoon()], command.rungs("cnn_lstm"), "normal"))
+
+
+def test_a_page_names_the_file_that_was_judged_also_where_a_shipped_one_is_called_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine = build(tmp_path / "lstm.onnx")
+    quiet = Heard("table", "a", 0, [], {"lstm": []}, 1800.0)
+    monkeypatch.setattr(command, "in_processes", lambda *_: [[quiet]])
+    page = tmp_path / "page.md"
+    page.write_text("<!-- everyday: begin -->\n<!-- everyday: end -->\n")
+    assert main(["everyday", str(mine), "--document", str(page)]) == 0
+    match = LINE.fullmatch(page.read_text().splitlines()[1])
+    assert match and match[2] == f"lstm.onnx {file_digest(mine)[:12]}"
 
 
 def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:

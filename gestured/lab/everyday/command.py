@@ -20,7 +20,7 @@ from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.table import Table
 from gestured.model.model import Model
 from gestured.model.opening import open_model
-from gestured.model.shipped import LADDER, shipped
+from gestured.model.shipped import LADDER, shipped, shipped_name
 from gestured.record.files import PUBLIC, atomic_write
 
 LEAST_S = 1.0  # s, the least that all recordings together last: a rate by the hour needs some time
@@ -29,7 +29,7 @@ LEAST_S = 1.0  # s, the least that all recordings together last: a rate by the h
 @cache
 def rungs(source: str) -> tuple[Model, ...]:
     """A model, and after it the shipped ones that know the same gestures; held open in each process."""
-    first = open_model(Path(source) if "/" in source or source.endswith(".onnx") else source)
+    first = open_model(source)
     others = [open_model(name) for name in LADDER if name != first.name]
     return (first, *(model for model in others if model.gestures == first.gestures))
 
@@ -76,8 +76,9 @@ def run(args: argparse.Namespace) -> int:
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
     if args.document:
-        sources = [shipped().get(model.name, Path(args.model)) for model in models]
-        made = made_of(args.words, [*sources, *([args.svg] if args.svg else [])])
+        name, others = shipped_name(args.model), [shipped()[model.name] for model in models[1:]]
+        first = shipped()[name] if name else Path(args.model)  # a file of one's own may have a shipped one's name
+        made = made_of(args.words, [first, *others, *([args.svg] if args.svg else [])])
         renew(args.document, block, [made, "", *map(str, shown)])
     tell(found, shown, args.json)
     return 0
