@@ -13,18 +13,16 @@ from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import MIXED, REAL_FILES, TrainingPlan
+from gestured.lab.written import write
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import NON_GESTURES
 
 
 def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
     """One Markdown file beside each model."""
     for name, found in figures.items():
-        card = _card(folder / f"{name}.onnx", name, found, plan)
-        with atomic_write(folder / f"{name}.md", PUBLIC) as file:
-            file.write(card.encode())
+        write(folder / f"{name}.md", _card(folder / f"{name}.onnx", name, found, plan))
 
 
 def write_blocks(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import code_digest, file_digest
-from gestured.record.files import PUBLIC, atomic_write
+from gestured.lab.written import write
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
 LINE = re.compile(
@@ -83,8 +83,7 @@ def renew(document: Path, name: str, lines: Iterable[str]) -> None:
             "missing, such as --real? Nothing was written"
         )
     block = "\n".join([begin, *made, end])
-    with atomic_write(document, PUBLIC) as file:
-        file.write((text[: text.index(begin)] + block + text[text.index(end) + len(end) :]).encode())
+    write(document, text[: text.index(begin)] + block + text[text.index(end) + len(end) :])
 
 
 def require_marks(name: str, *pages: Path | None) -> None:

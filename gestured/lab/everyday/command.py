@@ -18,10 +18,10 @@ from gestured.lab.everyday.hours import Heard, hear, points_of
 from gestured.lab.everyday.stretches import lived, recorded
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.table import Table
+from gestured.lab.written import write
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped, shipped_name
-from gestured.record.files import PUBLIC, atomic_write
 
 LEAST_S = 1.0  # s, the least that all recordings together last: a rate by the hour needs some time
 
@@ -70,8 +70,7 @@ def run(args: argparse.Namespace) -> int:
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
-        with atomic_write(args.svg, PUBLIC) as file:
-            file.write(draw(found).encode())
+        write(args.svg, draw(found))
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]

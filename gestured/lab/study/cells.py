@@ -19,7 +19,7 @@ from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.study.material import Data
 from gestured.lab.study.protocols import Result, Task, run
-from gestured.record.files import PUBLIC, atomic_write
+from gestured.lab.written import write
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,7 @@ def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
 def keep(path: Path, result: Any) -> None:
     """Write a checkpoint, all or nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
-        file.write(json.dumps(result).encode())
+    write(path, json.dumps(result), durable=False)
 
 
 def _read(path: Path) -> Result | None:

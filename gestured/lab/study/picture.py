@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 from gestured.core.timing import Timing
 from gestured.lab.drawing import INK, SOFT, sheet, styled, svg
 from gestured.lab.samples import WINDOW
+from gestured.lab.written import write
 
 Study = dict[str, Any]
 Row = dict[str, Any]
@@ -43,9 +44,9 @@ def title(study: Study, method: str) -> str:
 def write_picture(study: Study, out: Path) -> Path:
     """Write out/operating-points.json, what the picture is drawn from, and out/operating-points.svg; its path."""
     kept, path = points(study), out / "operating-points.svg"
-    (out / "operating-points.json").write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    write(out / "operating-points.json", json.dumps(kept, indent=1) + "\n")
     with styled():
-        path.write_text(svg(operating_points(kept), TITLE), encoding="utf-8")
+        write(path, svg(operating_points(kept), TITLE))
     return path
 
 

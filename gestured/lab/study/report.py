@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader
 from gestured.lab import drawing
 from gestured.lab.study import picture
 from gestured.lab.study.picture import Row, Study
+from gestured.lab.written import write
 
 EMPTY = re.compile(r"^### .*\n\n(?:[^|\n].*\n\n)?(?:^\|.*\n){2}(?!\|)\n?", re.MULTILINE)  # a table without a row
 PROTOCOLS = {
@@ -37,9 +38,9 @@ def write_report(study: Study, out: Path) -> Path:
     templates.filters["values"] = values
     path, template = out / "tables.md", templates.get_template("tables.md")
     told = template.render(study=study, protocols=PROTOCOLS, lines=lines(study))
-    path.write_text(EMPTY.sub("", told), "utf-8")
+    write(path, EMPTY.sub("", told))
     with drawing.styled():
-        (out / "confusion.svg").write_text(drawing.svg(picture.confusion(study), picture.CONFUSION), "utf-8")
+        write(out / "confusion.svg", drawing.svg(picture.confusion(study), picture.CONFUSION))
     if study["run_time"]:
         picture.write_picture(study, out)
     return path

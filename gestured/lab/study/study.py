@@ -30,8 +30,8 @@ from gestured.lab.study.run_time import measure, with_fields
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tables import Plan
 from gestured.lab.study.views import Values
+from gestured.lab.written import write
 from gestured.model.shipped import shipped
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES
 
 PAPER_CITED = (
@@ -52,8 +52,7 @@ def run(args: argparse.Namespace) -> int:
     schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
     study = compute(plan, schedule, args.real, args.foreign)
     study["about"]["command"] = args.words
-    with atomic_write(args.out / "study.json", PUBLIC) as file:
-        file.write(json.dumps(study).encode())
+    write(args.out / "study.json", json.dumps(study))
     tables_path = write_report(study, args.out)
     if args.document:
         lines = tables_path.read_text("utf-8").splitlines()[1:]  # the first says what they were made of, as `made` does
