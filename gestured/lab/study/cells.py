@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import code_digest
@@ -79,10 +80,14 @@ def compute(task: Task, data: Data) -> tuple[Task, Result]:
 
 @contextmanager
 def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
-    """joblib's own processes, or Dask's workers behind a scheduler's address."""
+    """joblib's own processes, or Dask's workers behind a scheduler's address. GesturedError where one is killed."""
     if cluster is None:
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            yield
+        try:
+            with parallel_config(backend="loky", inner_max_num_threads=1):
+                yield
+        except TerminatedWorkerError:
+            reason = "as where there is too little memory"
+            raise GesturedError(f"a process that --jobs started was killed, {reason}") from None
         return
     try:
         from distributed import Client

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from joblib import Parallel
@@ -110,6 +111,14 @@ def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
     alone = dict(cells.compute(one, sets["simulated"]) for one in TASKS)
     together = Schedule(tmp_path / "together", 1, cluster).results(TASKS, sets, "cells")
     assert without_time(together) == without_time(alone)  # type: ignore[arg-type]
+
+
+def test_a_process_that_is_killed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # By value, so that the processes need not import this file and what it stands on.
+    monkeypatch.setattr(cells, "compute", lambda *_: __import__("os").kill(__import__("os").getpid(), 9))
+    task = SimpleNamespace(data="simulated")
+    with pytest.raises(GesturedError, match="a process that --jobs started was killed"):
+        list(Schedule(tmp_path, 2)._computed([task, task], {"simulated": None}))
 
 
 def test_without_a_scheduler_one_sentence_says_so(tmp_path: Path) -> None:
