@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gestured.client.sensor import Form
 from gestured.control.diff import Answer, Difference, Knew, Line, Verdict
@@ -19,13 +20,21 @@ from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
 SOURCE = Address("127.0.0.1", 9)  # a sender to stand for the file; port 9 discards, and nobody sends from it
+STANDS_OUT = 0.5  # of the farthest that any taxel comes: more than noise, and where a finger presses
 DIFFERENT = ("wrong", "missed", "false")
+
+
+def stands_out(frames: NDArray[np.generic]) -> int:
+    """The first of (T, R, C) frames that is far from what the sensor mostly shows: about where a touch begins."""
+    way = np.abs(frames - np.median(frames, axis=0)).max(axis=(1, 2))
+    return int(np.argmax(way >= STANDS_OUT * way.max()))
 
 
 class Labelled:
     """A file in the contract's form, played as one sensor, one recording after the other. Raises RecordingError.
 
     Before each recording the frame counter leaps, as that of a sensor which starts anew: each is learned by itself.
+    Where nobody has marked when a performance began, it begins where the frames first stand out.
     """
 
     def __init__(self, path: Path, sensor: str) -> None:
@@ -78,19 +87,17 @@ class Labelled:
         """What the labels say, in the times of playing."""
         found = self._found
         for g, label in enumerate(found.labels.tolist()):
-            if label != SESSION and found.onsets is not None:
-                times, first = found.times_of(g), int(found.onsets[g])
+            if label == SESSION:
+                if found.event_recording is None:
+                    raise RecordingError(
+                        f"{self._path}: event_labels: recording {g} is a session whose events are not known"
+                    )
+            elif found.onsets is not None or label != NONE:  # of other things all is false, whenever they began
+                times = found.times_of(g)
+                first = stands_out(found.frames_of(g)) if found.onsets is None else int(found.onsets[g])
                 last = -1 if found.releases is None else int(found.releases[g])
                 kind = label if found.kinds is None else str(found.kinds[g])
                 yield self._played(g, label, kind, float(times[first]), float(times[last]))
-            elif label not in (SESSION, NONE):  # of a non-gesture whatever is said is false, whenever it began
-                raise RecordingError(
-                    f"{self._path}: onsets: is missing, expected the frame with which each performance begins"
-                )
-            elif label == SESSION and found.event_recording is None:
-                raise RecordingError(
-                    f"{self._path}: event_labels: recording {g} is a session whose events are not known"
-                )
         if found.event_recording is not None:
             columns = (found.event_labels, found.event_kinds, found.event_onsets, found.event_offsets)
             rows = zip(found.event_recording.tolist(), *(c.tolist() for c in columns if c is not None), strict=True)
