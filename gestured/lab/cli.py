@@ -24,6 +24,7 @@ CACHE = Path(".cache/lab")
 MODELS = Path("models")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
+KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # what is finished, for the same command again
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",
@@ -158,7 +159,8 @@ def _run(args: argparse.Namespace) -> int:
     except OSError as error:
         raise GesturedError(str(error)) from error
     except KeyboardInterrupt:
-        say("", "gestured-lab: interrupted; what is finished is kept", to=sys.stderr)
+        kept = "; what is finished is kept" if args.command in KEEPS else ""
+        say("", f"gestured-lab: interrupted{kept}", to=sys.stderr)
         return 130
 
 

@@ -6,6 +6,9 @@ from gestured.record.files import PUBLIC, atomic_write
 
 
 def write(path: Path, text: str, *, durable: bool = True) -> None:
-    """Put a text into the place of a file; whatever is raised, as of a full disk, leaves the file as it was."""
-    with atomic_write(path, PUBLIC, durable=durable) as file:
-        file.write(text.encode())
+    """Put a text into the place of a file. OSError, as of a full disk, names the file, which is as it was."""
+    try:
+        with atomic_write(path, PUBLIC, durable=durable) as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error

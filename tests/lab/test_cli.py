@@ -127,17 +127,16 @@ def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.Captu
     assert "nowhere.onnx" in line
 
 
-def test_an_interrupted_run_says_that_nothing_finished_is_lost(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("name", "words"), [("study", "; what is finished is kept"), ("everyday", "")])
+def test_an_interrupted_run_says_where_nothing_finished_is_lost(
+    name: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gestured.lab.everyday import command
-
     def interrupt(_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "run", interrupt)
-    assert main(["everyday"]) == 130
-    assert "what is finished is kept" in capsys.readouterr().err
+    monkeypatch.setattr("gestured.lab.cli.import_module", lambda _: argparse.Namespace(run=interrupt))
+    assert main([name]) == 130
+    assert capsys.readouterr().err == f"\ngestured-lab: interrupted{words}\n"
 
 
 @pytest.mark.usefixtures("lab")

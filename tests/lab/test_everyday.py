@@ -1,6 +1,8 @@
 """The judge of everyday life: one rule for simulated days, the other generator's hours, recordings and tapes."""
 
+import errno
 import json
+import os
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -276,6 +278,20 @@ def test_a_page_names_the_file_that_was_judged_also_where_a_shipped_one_is_calle
     assert main(["everyday", str(mine), "--document", str(page)]) == 0
     match = LINE.fullmatch(page.read_text().splitlines()[1])
     assert match and match[2] == f"lstm.onnx {file_digest(mine)[:12]}"
+
+
+def test_a_disk_without_room_for_the_picture_takes_no_figures_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
+    monkeypatch.setattr(os, "fsync", full)
+    assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 1
+    out, err = capsys.readouterr()
+    assert "### By gesture" in out and list(tmp_path.iterdir()) == []
+    assert err == f"gestured-lab: [Errno 28] No space left on device: '{tmp_path}/curve.svg'\n"
 
 
 def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:

@@ -67,19 +67,19 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"{args.recordings[0]}: expected at least {LEAST_S:g} s of frames")
     models = models[:1] if args.arming else models
     found = report.figures(heard, models, args.strictness, published=bool(armed))
+    shown = report.tables(found, "recorded" if args.recordings else "simulated")
+    if args.arming:
+        shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
+    tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
         write(args.svg, draw(found))
-    shown = report.tables(found, "recorded" if args.recordings else "simulated")
-    if args.arming:
-        shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
     if args.document:
         name, others = shipped_name(args.model), [shipped()[model.name] for model in models[1:]]
         first = shipped()[name] if name else Path(args.model)  # a file of one's own may have a shipped one's name
         made = made_of(args.words, [first, *others, *([args.svg] if args.svg else [])])
         renew(args.document, block, [made, "", *map(str, shown)])
-    tell(found, shown, args.json)
     return 0
 
 
