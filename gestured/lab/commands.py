@@ -11,6 +11,7 @@ from gestured.client.say import say, say_drawn
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import write_manifest
+from gestured.lab.fit import RECURRENT
 from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
 from gestured.lab.train import TrainingPlan, load_data, train
@@ -40,10 +41,9 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     train(plan, args.out, args.cache, args.real, args.jobs, args.recordings)
     minutes = (time.monotonic() - start) / 60
     say(f"trained in {minutes:.1f} minutes (finished steps are taken from {args.cache})")
-    for name in LADDER:
-        path = args.out / f"{name}.onnx"
-        if own.open_file(path).embeds:
-            own.teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
+    for name in RECURRENT:
+        people = own.QUICK_PEOPLE if args.quick else own.PEOPLE
+        own.teach(args.out / f"{name}.onnx", args.cache, people, args.jobs)
 
 
 def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:

@@ -227,17 +227,12 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
     return space
 
 
-def open_file(path: Path) -> Model:
-    """A model that was made here; whether its file is the one in the manifest does not matter. Raises ModelError."""
+def embedding_of(path: Path) -> Model:
+    """A model that can compare examples, whether or not its file is the one in the manifest; ModelError for others."""
     try:
-        return Model(read_bytes(path), path.stem)
+        model = Model(read_bytes(path), path.stem)
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from error
-
-
-def embedding_of(path: Path) -> Model:
-    """A model that can compare examples; ModelError for one that has no embedding."""
-    model = open_file(path)
     if not model.embeds:
         raise ModelError(f"{path}: has no output 'embedding', expected a model that gestured-lab train made")
     return model
