@@ -24,8 +24,8 @@ from gestured.lab.own.learn import PEOPLE, teach
 from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.samples import WINDOW, Samples
+from gestured.lab.written import write
 from gestured.model.shipped import shipped_name
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 
 MOST_STEPS = 10_000
@@ -63,12 +63,13 @@ def run(args: argparse.Namespace) -> int:
     found = adapt(base, own, takes, Course(steps=args.steps))
     reasons = found.reasons()
     written = not reasons or args.force
+    if not args.json:
+        _tell(own, found)
     if written:
         _write(found, out, _facts(base, own, found, takes.teach, args.recordings), cache)
     if args.json:
         say_json(_figures(own, found) | {"written": str(out) if written else None, "reasons": reasons})
     else:
-        _tell(own, found)
         why = f": {'; '.join(reasons)}" if reasons else ""
         say(f"{out}: {'written' if written else 'not written'}{why}", to=sys.stdout if written else sys.stderr)
     return 0 if written else 1
@@ -80,8 +81,7 @@ def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
         made = Path(folder) / out.name
         export_net(found.new.judged, made, facts)
         teach(made, cache, PEOPLE, JOBS)
-        with atomic_write(out, PUBLIC) as file:
-            file.write(made.read_bytes())
+        write(out, made.read_bytes())
 
 
 def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:

@@ -1,6 +1,7 @@
 """`gestured-lab adapt`: what it writes, what it says, and that it writes nothing where that is no better."""
 
 import argparse
+import errno
 import json
 import re
 import shlex
@@ -163,6 +164,25 @@ def test_only_where_nothing_is_written_the_status_is_1(
     line = ["adapt", "a.npz", "--cache", str(tmp_path), "--out", str(tmp_path / "my.onnx")]
     assert main([*line, *flags]) == status
     assert [path.name for path in tmp_path.iterdir()] == made
+
+
+def test_a_disk_without_room_for_the_model_takes_no_figures_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "my.onnx")
+
+    class Better:
+        def reasons(self) -> list[str]:
+            return []
+
+    for name in ("base_of", "own_recordings", "simulate", "_facts"):
+        monkeypatch.setattr(command, name, lambda *_: argparse.Namespace(teach=None))
+    monkeypatch.setattr(command, "adapt", lambda *_: Better())
+    monkeypatch.setattr(command, "_tell", lambda *_: print("right 0.9"))
+    monkeypatch.setattr(command, "_write", full)
+    assert main(["adapt", "a.npz", "--cache", str(tmp_path), "--out", str(tmp_path / "my.onnx")]) == 1
+    assert capsys.readouterr() == ("right 0.9\n", "gestured-lab: [Errno 28] No space left on device: 'my.onnx'\n")
 
 
 @pytest.mark.hostile
