@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ STANDS_OUT = 0.5  # of the farthest that any taxel comes: more than noise, and w
 DIFFERENT = ("wrong", "missed", "false")
 
 
-def stands_out(frames: NDArray[np.generic]) -> int:
+def stands_out(frames: NDArray[Any]) -> int:
     """The first of (T, R, C) frames that is far from what the sensor mostly shows: about where a touch begins."""
     way = np.abs(frames - np.median(frames, axis=0)).max(axis=(1, 2))
     return int(np.argmax(way >= STANDS_OUT * way.max()))

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from joblib import Parallel
@@ -116,9 +117,10 @@ def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
 def test_a_process_that_is_killed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # By value, so that the processes need not import this file and what it stands on.
     monkeypatch.setattr(cells, "compute", lambda *_: __import__("os").kill(__import__("os").getpid(), 9))
-    task = SimpleNamespace(data="simulated")
+    task: Any = SimpleNamespace(data="simulated")
+    data: Any = None
     with pytest.raises(GesturedError, match="a process that --jobs started was killed"):
-        list(Schedule(tmp_path, 2)._computed([task, task], {"simulated": None}))
+        list(Schedule(tmp_path, 2)._computed([task, task], {"simulated": data}))
 
 
 def test_without_a_scheduler_one_sentence_says_so(tmp_path: Path) -> None:
