@@ -24,14 +24,6 @@ def test_a_port_of_the_same_host_cannot_take_a_name_whose_sender_goes_on() -> No
     assert not owner.admits(OTHER, 0.068, STALE_S) and not owner.admits((HOST, 3), 0.069, STALE_S)
 
 
-def test_another_host_waits_until_the_owner_is_silent() -> None:
-    owner = Owner(FIRST)
-    assert owner.admits(FIRST, 0.0, STALE_S)
-    assert not owner.admits(("10.0.0.2", 1), STALE_S, STALE_S)
-    assert owner.admits(("10.0.0.2", 1), 1.01 * STALE_S, STALE_S)
-    assert not owner.admits(FIRST, 1.02 * STALE_S, STALE_S)
-
-
 @given(st.lists(st.tuples(st.sampled_from([(HOST, port) for port in range(2, 6)]), st.floats(0.0, 0.06)), max_size=40))
 def test_whoever_sends_steadily_is_never_refused(others: list[tuple[tuple[str, int], float]]) -> None:
     """The first sender, every 67 ms, with anything in between from ports of its own host."""

@@ -47,12 +47,15 @@ def test_a_contact_goes_on_after_a_pause_of_less_than_a_second_and_is_over_after
     assert kinds(answers(times + pause * (times > 2.4), frames)) == expected
 
 
-@pytest.mark.parametrize(("pause", "reasons"), [(0.9, ["second_source"]), (1.1, [])])
-def test_another_source_has_a_sensor_once_its_owner_was_silent_for_a_second(pause: float, reasons: list[str]) -> None:
-    hub, packet = Hub(SCENE, Sure()), floats("/arm/pressure", np.zeros(SHAPE), 0)
-    hub.receive([(packet, FIRST)], 5.0)
-    facts = hub.receive([(packet, SECOND)], 5.0 + pause)
-    assert [fact.reason for fact in facts if isinstance(fact, Dropped)] == reasons
+@pytest.mark.parametrize(("pause", "refused"), [(0.9, SECOND), (1.1, FIRST)])
+def test_another_source_has_a_sensor_once_its_owner_was_silent_for_a_second(
+    pause: float, refused: tuple[str, int]
+) -> None:
+    hub, packet, facts = Hub(SCENE, Sure()), floats("/arm/pressure", np.zeros(SHAPE), 0), list[object]()
+    for now, source in ((5.0, FIRST), (5.0 + pause, SECOND), (5.01 + pause, FIRST)):
+        facts += hub.receive([(packet, source)], now)
+    dropped = [fact for fact in facts if isinstance(fact, Dropped)]
+    assert [(fact.reason, fact.source) for fact in dropped] == [("second_source", refused)]
 
 
 @pytest.mark.parametrize(("times_the_noise", "bad"), [(6.5, 0), (9.5, 1)])

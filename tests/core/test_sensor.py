@@ -211,14 +211,6 @@ def test_a_slow_sensor_may_show_the_same_twice_before_it_is_touched() -> None:
     assert isinstance(answer, Gesture)
 
 
-def test_a_sensor_that_says_no_more_once_the_finger_is_off_is_answered() -> None:
-    stream = frames(*SLOW_SWIPE)
-    end = touched(stream)[1] + 2
-    subject = recognizer(Fake())
-    events = run(subject, stream[:end]) + subject.flush(stream[end - 1].t + 5.0)
-    assert [type(event) for event in answers(events)] == [Gesture]
-
-
 @pytest.mark.parametrize(("rate", "reason"), [(3, "rate"), (5, "confidence"), (15, "confidence"), (1000, "confidence")])
 def test_a_rate_that_the_models_do_not_know_is_the_reason(rate: int, reason: str) -> None:
     stream = frames(f"sensor rate {rate}", "quiet for 3s", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 2s")

@@ -67,12 +67,6 @@ def test_in_a_zone_of_silence_nothing_begins_whatever_the_threshold() -> None:
     assert isinstance(found, Unknown) and found.confidence == 0.0
 
 
-def test_a_contact_belongs_to_the_zone_in_which_it_begins() -> None:
-    zones = {"here": (0, 0, 0.5, 1), "there": (0.5, 0, 1, 1)}
-    found = answer(zones, says(0.05, 0.9, 0.05))
-    assert isinstance(found, Gesture) and found.where is not None and found.where.zone == "here"
-
-
 @pytest.mark.parametrize(
     ("gestures", "name", "confidence"),
     [
