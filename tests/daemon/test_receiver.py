@@ -50,7 +50,8 @@ class Machine:
         self.served: list[tuple[bytes, Source]] = []
         self.owners: dict[Source, int] = {}  # sensors of those who were served before the last tick
         self.each = 1  # sensors that a source owns
-        self.due = float("inf")
+        self.due, self.due_s = float("inf"), float("inf")  # s, when time alone decides; so long after a packet
+        self.waits_s: list[float] = []  # by which it was decided later than that
         self._sent, self._cost = deque((START_S + t, packet, source) for t, packet, source in sorted(sent)), cost
         self._buffer: deque[Sent] = deque()
         self._size = self._dropped = self._looks = 0
@@ -67,9 +68,9 @@ class Machine:
     def work(self, seconds: float) -> None:
         """The processor does something for so long."""
         self.worked_s += seconds
-        self.wait(seconds)
+        self.passes(seconds)
 
-    def wait(self, seconds: float) -> None:
+    def passes(self, seconds: float) -> None:
         """Time passes, and packets arrive."""
         self.now += seconds
         while self._sent and self._sent[0][0] <= self.now:
@@ -87,7 +88,7 @@ class Machine:
     def clock(self) -> float:
         self._looks += 1
         if self._looks in self._stops:
-            self.wait(STOP_S)
+            self.passes(STOP_S)
         return self.now
 
     # --- the loop
@@ -117,8 +118,8 @@ class Machine:
             self._reader()
         elif not due:
             following = [timer.when for timer in self._timers] + [t for t, _, _ in list(self._sent)[:1]]
-            self.wait(max(0.0, min(following, default=self.now) - self.now))
-        self.wait(TURN_S)
+            self.passes(max(0.0, min(following, default=self.now) - self.now))
+        self.passes(TURN_S)
 
     # --- the socket
 
@@ -148,11 +149,17 @@ class Machine:
             self.latest_s = max(self.latest_s, self.now - came)
             self.work(self._cost(packet))
             self.served.append((packet, source))
+            self.due = now + self.due_s
         return []
 
     def ask(self, now: float) -> list[Any]:
         self.asks -= 1
         self.work(self.look_s)
+        return []
+
+    def wait(self, now: float) -> list[Any]:
+        self.waits_s.append(self.now - self.due)
+        self.due = float("inf")
         return []
 
     def look(self, now: float) -> list[Any]:
@@ -298,3 +305,14 @@ def test_of_segments_that_are_shown_together_each_gets_its_name_and_no_packet_wa
     run(machine, 6.0)
     assert machine.asks == 0
     assert machine.latest_s < quiet + 2 * machine.look_s
+
+
+@pytest.mark.parametrize(("apart_s", "most_s"), [(1 / 15, 0.0002), (0.008, 0.0022)])
+def test_what_time_alone_decides_waits_neither_for_a_packet_nor_for_a_tick(apart_s: float, most_s: float) -> None:
+    """It is decided at that moment; beside packets that come often, with the next turn of a timer of milliseconds."""
+    for due_s in (0.0301, 0.1317):
+        machine = Machine([(0.01 + n * apart_s, b"x", ("10.0.0.1", 1)) for n in range(5)], lambda packet: 1e-5)
+        machine.due_s = due_s
+        run(machine, 1.0)
+        (late_s,) = machine.waits_s[-1:]
+        assert 0.0 <= late_s < most_s

@@ -37,14 +37,6 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
     assert before + 1.5 < event["onset"] < time.time() + 10
 
 
-def test_an_answer_waits_for_no_frame(shared: Daemon) -> None:
-    client = shared.client()
-    sensor = Sensor(shared, "ends").begin()
-    sensor.send(sensor.hand.swipe("left"), sensor.hand.idle(2 / harness.RATE_HZ))  # and nothing more
-    (event,) = client.events("gesture", "ends")
-    assert event["decided"] - event["offset"] == pytest.approx(1 / harness.RATE_HZ + 0.1, abs=1e-3)
-
-
 def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
     client = shared.client()
     sensor = Sensor(shared, "packed", harness.counted).begin()
