@@ -136,14 +136,6 @@ def test_each_program_prints_help_without_the_extras(installed: Path, tmp_path: 
     assert "example" in done.stdout
 
 
-def test_without_the_extra_the_lab_says_what_to_install(installed: Path, tmp_path: Path):
-    code = "sys.argv = ['gestured-lab', 'train']\nfrom gestured.lab.cli import main\nsys.exit(main())"
-    done = python_without(EXTRAS, code, installed, tmp_path)
-    assert done.returncode != 0
-    assert "Traceback" not in done.stderr and done.stderr.count("\n") == 1
-    assert "gestured[lab]" in done.stderr or "make lab" in done.stderr
-
-
 @pytest.mark.parametrize("command", sorted(subcommands("gesturectl")))
 def test_each_subcommand_shows_an_example_that_is_valid(command: str):
     help_text = subcommands("gesturectl")[command].format_help()

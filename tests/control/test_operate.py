@@ -29,6 +29,8 @@ def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
     assert "model tiny 1" in out and re.search(r"seat +swipe_left +0\.\d\d$", out, re.MULTILINE)
     found = json.loads(ctl("status", "--json")[1])
     assert found["sensors"]["seat"]["gestures"] == 1 and found["ready"]["ready"] is True
+    assert found["answers"]["gestures"]["swipe_left"] >= 1 and found["flight_recorder"]["held_bytes"] > 0
+    assert found["addresses"]["listen"] == daemon.ready["listen"] and found["model"]["rung"] == 0
 
 
 def test_status_of_a_daemon_that_is_not_ready(daemon: Daemon) -> None:

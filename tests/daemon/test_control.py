@@ -95,21 +95,6 @@ def test_a_request_that_is_too_long_is_refused(daemon: Daemon) -> None:
         control.ask("emit", gesture="x" * 100_000)
 
 
-def test_status_says_how_the_daemon_is(daemon: Daemon) -> None:
-    client = daemon.client()
-    Sensor(daemon, "seen").begin().perform("left")
-    client.events("gesture", "seen")
-    status = daemon.ask("status")
-    assert status["model"]["active"] == "tiny" and status["model"]["rung"] == 0
-    assert status["addresses"]["listen"] == daemon.ready["listen"]
-    sensor = status["sensors"]["seen"]
-    assert (sensor["state"], sensor["gestures"], sensor["grid"]) == ("ok", 1, "9x9")
-    assert sensor["rate_hz"] == pytest.approx(15, rel=0.1)
-    assert {"sensor": "seen", "answer": "swipe_left", "test": False}.items() <= status["recent"][-1].items()
-    assert status["answers"]["gestures"]["swipe_left"] >= 1
-    assert status["flight_recorder"]["held_bytes"] > 0
-
-
 def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp: socket.socket) -> None:
     to = f"osc://127.0.0.1:{udp.getsockname()[1]}"
     daemon = start("--clock", "sensor", "--publish", to, "--publish-provisional", "true")
