@@ -182,8 +182,3 @@ def test_a_port_that_is_taken_is_named_with_what_shows_by_whom(run, udp: socket.
     port = udp.getsockname()[1]
     status, _, err = run("sniff", "--listen", f"127.0.0.1:{port}")
     assert status == 1 and f"127.0.0.1:{port}: Address already in use: sudo ss -ulpn 'sport = :{port}'" in err
-
-
-def test_what_no_daemon_sends_ends_listen_with_2_and_a_line_that_names_it(run, daemon: Daemon) -> None:
-    status, out, err = run("listen", "--socket", daemon.socket, "--gesture", "swipe_lefft")
-    assert status == 2 and out == "" and "swipe_lefft" in err and "swipe_left" in err

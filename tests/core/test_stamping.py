@@ -151,12 +151,6 @@ def test_ten_seconds_forward_are_plausible() -> None:
     assert times(got) == [50.0, 60.0] and not got[1].implausible
 
 
-def test_several_frames_of_one_bundle_share_its_interval() -> None:
-    stamper = Stamper("sensor")
-    calls = [(50.0, [felt(timetag=1000 + n * 0.3)] * 3) for n in range(20)]
-    assert np.diff(times(stamps(stamper, *calls)))[5:] == pytest.approx(0.1)
-
-
 def test_packets_that_waited_together_keep_their_own_time_tags() -> None:
     stamper = Stamper("sensor")
     got = stamps(stamper, (50.0, [felt(timetag=1000.0)]), (51.0, [felt(timetag=1000 + x) for x in (0.1, 0.5, 0.6)]))
