@@ -16,16 +16,14 @@ from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 
 from gestured.core.errors import ModelError
-from gestured.core.frames import Segment
-from gestured.core.window import Window
 from gestured.lab.export import Facts, export_forest, export_net, measured, write_manifest
 from gestured.lab.forest import forest_outputs
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.features import feature_names
 from gestured.model.opening import open_model
+from tests.small_model import WINDOW, segment
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
-WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
 CARD: dict[str, Any] = {
     "kind": "test_net",
     "version": "1.2.0",
@@ -71,13 +69,6 @@ def net(tmp_path_factory: pytest.TempPathFactory) -> tuple[Net, Path]:
     path = tmp_path_factory.mktemp("net") / "test_net.onnx"
     export_net(module, path, Facts(**CARD))
     return module, path
-
-
-def segment() -> Segment:
-    values = np.zeros((8, 9, 9), np.float32)
-    for t in range(6):
-        values[t + 1, 8 - t, 3:5] = 100.0
-    return Segment(values, np.arange(8) / 15.0, 1, 6, 1.0)
 
 
 def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path]) -> None:
