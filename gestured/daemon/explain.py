@@ -158,7 +158,7 @@ def _strictness(settings: Settings, ladder: Ladder) -> Said:
             continue
         for name, point in model.points.items():
             cost = f"{100 * point.missed:.1f} % missed, {point.false_per_hour:.2g} false an hour"
-            yield THRESHOLDS, f"{rung.name} {name}: {cost}, in {point.hours:g} hours that were judged"
+            yield THRESHOLDS, f"{rung.name} {name}: {cost}, in the {point.hours:g} hours on which it was chosen"
         if arms:
             most = f"{model.threshold:.2f} at most, whatever the strictness"
             yield THRESHOLDS, f"{rung.name}, after a gesture that arms: {most}"

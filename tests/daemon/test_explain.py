@@ -85,9 +85,9 @@ def test_what_each_strictness_costs_is_said_for_each_rung_and_what_holds_before_
     lines = [line.strip() for line in said.split("thresholds:\n")[1].split("\n\n")[0].splitlines()]
     assert lines == [
         "strictness normal, arm strict",
-        "mine eager: 3.0 % missed, 2.8 false an hour, in 12 hours that were judged",
-        "mine normal: 6.0 % missed, 1.6 false an hour, in 12 hours that were judged",
-        "mine strict: 9.0 % missed, 0.4 false an hour, in 12 hours that were judged",
+        "mine eager: 3.0 % missed, 2.8 false an hour, in the 12 hours on which it was chosen",
+        "mine normal: 6.0 % missed, 1.6 false an hour, in the 12 hours on which it was chosen",
+        "mine strict: 9.0 % missed, 0.4 false an hour, in the 12 hours on which it was chosen",
         f"{model.stem} has no operating points: 0.50 for all, whatever the strictness",
         "before these, thresholds of [gestures]: one_tap 0.8",
     ]
