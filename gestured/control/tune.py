@@ -56,7 +56,8 @@ def run(args: argparse.Namespace) -> int:
     for path in args.recordings:
         play(path, model, played)
     if not played.performed and played.seconds < SHORTEST_S:
-        raise RecordingError(f"{args.recordings[0]}: expected gestures, or a minute of something else")
+        found = f"{args.recordings[0]}: found {played.seconds:.0f} s in which nobody made a gesture"
+        raise RecordingError(f"{found}, expected at least {SHORTEST_S:.0f} s of that, or recorded gestures")
     tuned = tune(model, played, args.budget)
     if args.json:
         say_json(_figures(tuned))

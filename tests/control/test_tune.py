@@ -242,6 +242,15 @@ def test_what_cannot_be_tuned_on_is_one_sentence(run, recorded: Path, tmp_path: 
         assert status == 1 and reason in err and err.count("\n") == 1
 
 
+def test_a_tape_that_is_too_short_is_told_how_long_it_is(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def play(path: Path, model: Model, played: Played) -> None:
+        played.seconds += 3.1
+
+    monkeypatch.setattr("gestured.control.tune.play", play)
+    status, _, err = run("tune", "short.mcap")
+    assert status == 1 and "short.mcap: found 3 s in which nobody made a gesture, expected at least 60 s of that" in err
+
+
 def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_miss_nothing(
     run, models: dict[bool, Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
