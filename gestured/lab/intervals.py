@@ -6,10 +6,10 @@ share and on the logarithm of a rate.
 """
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 CONFIDENCE_LEVEL = 0.95
 RULE_OF_THREE = 3.0  # where none of n was counted, the true share is at most 3 / n, at 95 %
@@ -61,8 +61,32 @@ def _half_width(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
     people = len(whole)
     left = part - part.sum() / whole.sum() * whole
     spread = math.sqrt(people / (people - 1) * float((left**2).sum())) / float(part.sum())
-    return float(stats.t.ppf((1 + CONFIDENCE_LEVEL) / 2, people - 1)) * spread
+    return student(people - 1) * spread
 
 
 def _normal() -> float:
-    return float(stats.norm.ppf((1 + CONFIDENCE_LEVEL) / 2))
+    return NormalDist().inv_cdf((1 + CONFIDENCE_LEVEL) / 2)
+
+
+def student(degrees: int) -> float:
+    """The t within which Student's distribution of so many degrees of freedom has its CONFIDENCE_LEVEL.
+
+    Without scipy, which the daemon's environment has not: hours of one's own are judged there, too.
+    """
+    low, high = 0.0, math.pi / 2  # of atan(t / sqrt(degrees))
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _within(middle, degrees) < CONFIDENCE_LEVEL else (low, middle)
+    return math.sqrt(degrees) * math.tan((low + high) / 2)
+
+
+def _within(angle: float, degrees: int) -> float:
+    """P(|T| < sqrt(degrees) tan(angle)), by the finite series for whole degrees (Abramowitz and Stegun, 26.7.3)."""
+    sine, cosine = math.sin(angle), math.cos(angle)
+    odd = degrees % 2
+    term = cosine if odd else 1.0
+    total = 0.0
+    for k in range(1 + odd, degrees, 2):  # each term is that of k and the one after it
+        total += term
+        term *= cosine * cosine * k / (k + 1)
+    return (angle + sine * total) * 2 / math.pi if odd else sine * total

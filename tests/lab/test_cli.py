@@ -26,8 +26,8 @@ COMMANDS = next(action.choices for action in parser()._actions if isinstance(act
 
 WITHOUT = """
 import sys
-package, lines = sys.argv[1], sys.argv[2:]
-sys.modules[package] = None
+packages, lines = sys.argv[1].split(","), sys.argv[2:]
+sys.modules.update(dict.fromkeys(packages))
 from gestured.lab.cli import main
 for line in lines:
     try:
@@ -40,7 +40,7 @@ for line in lines:
 
 
 def without(package: str, *lines: str, cwd: Path) -> "subprocess.CompletedProcess[str]":
-    """Lines of gestured-lab, until one fails, in a process where `package` cannot be imported."""
+    """Lines of gestured-lab, until one fails, where `package` cannot be imported; or several, by commas."""
     command = [sys.executable, "-c", WITHOUT, package, *lines]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=60)
@@ -51,6 +51,19 @@ def test_what_is_missing_is_said_in_one_sentence(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "gestured-lab: torch is missing: pip install 'gestured[lab]', or make lab\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("everyday --recordings none.mcap", "gestured-lab: none.mcap: cannot be read: No such file or directory"),
+        ("import --participant 07 --out a.npz none.csv", "gestured-lab: nothing could be imported"),
+        ("forget 07 none.npz --yes", "none.npz"),
+    ],
+)
+def test_hours_and_recordings_need_nothing_of_the_extra(line: str, says: str, tmp_path: Path) -> None:
+    done = without(",".join(["scipy", *LAB_PACKAGES]), line, cwd=tmp_path)
+    assert done.returncode == 1 and says in done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("package", LAB_PACKAGES)

@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from gestured.lab import commands, evaluate
 from gestured.lab.cli import main
 from gestured.lab.evaluate import outcome, worst
 from gestured.lab.fit import CLASSES
+from gestured.lab.intervals import CONFIDENCE_LEVEL, student
 from gestured.lab.samples import Samples
 
 THREE = np.eye(3, dtype=np.float32)
@@ -53,6 +55,11 @@ def test_the_shares_of_the_gestures_add_up(least: float) -> None:
     assert stricter.right <= found.right <= found.right_before
     assert stricter.wrong <= found.wrong
     assert stricter.rejected >= found.rejected
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3, 4, 9, 10, 33, 200])
+def test_students_distribution_is_that_of_scipy(degrees: int) -> None:
+    assert student(degrees) == pytest.approx(stats.t.ppf((1 + CONFIDENCE_LEVEL) / 2, degrees), rel=1e-12)
 
 
 def test_people_are_what_is_drawn_for_an_interval() -> None:
