@@ -19,6 +19,7 @@ import numpy as np
 
 from gestured.core.hub import Hub
 from gestured.daemon.backlog import FLOOD_S, GROUP, GROUP_BYTES, TOGETHER_S, Backlog, Packet
+from gestured.daemon.bunch import Bunches
 from gestured.daemon.desk import Desk
 from gestured.daemon.mute import LONGEST_S, Muted, Sender, mute
 from gestured.daemon.sockets import kernel_drops
@@ -56,6 +57,7 @@ class Receiver:
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
         self._backlog = Backlog(lambda source: hub.owners.get(source, 0))
+        self._bunches = Bunches(lambda source: source in hub.owners)
         self._muted = Muted()
         _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
         self._empty = empty  # s: what arrived until then was read
@@ -70,6 +72,7 @@ class Receiver:
         self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
+        self._holding: asyncio.TimerHandle | None = None  # until the next bunch is complete
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
         self._asking: asyncio.Handle | None = None
@@ -79,7 +82,7 @@ class Receiver:
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
-        for handle in (self._pause, self._again, self._alarm, self._asking, self._foreseeing):
+        for handle in (self._pause, self._again, self._holding, self._alarm, self._asking, self._foreseeing):
             if handle is not None:
                 handle.cancel()
 
@@ -102,6 +105,7 @@ class Receiver:
         self.read()
         while self._again is not None and self._clock() < end:
             self.read()
+        self._release(math.inf)
 
     def read(self) -> None:
         """Take what waits, and serve what a slice of time is enough for; the rest has its turn after everybody else."""
@@ -117,22 +121,44 @@ class Receiver:
         late = bool(found) and now - self._arrival(stamps[0], now) >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
             arrivals = self._arrivals(stamps, now)
-            self._backlog.add(found, arrivals)
+            self._put(found, arrivals, now)
             self._count_drops(now)
             if stamps[-1]:
                 self._empty = arrivals[-1]  # the kernel gives packets in the order in which they came
         elif found:
-            self._serve(found, now)
+            alone, _ = self._bunches.pick(found, [self._arrival(stamp, now) for stamp in stamps])
+            if alone:
+                self._serve(alone, now)
         if not full:
             self._empty = began  # whatever is found next came later, also where we were stopped since
         self._wall = wall
         if self._backlog:
             self._work(now)
+        self._release(now)
         self._mute(now, self._muted.over(now))
-        self.served = min(self._empty, self._backlog.oldest)
-        self.behind_s = now - self.served
+        self.served = min(self._empty, self._backlog.oldest, self._bunches.oldest)
+        self.behind_s = now - min(self._empty, self._backlog.oldest)
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
+
+    def _put(self, found: list[Packet], arrivals: list[float], now: float) -> None:
+        """Let packets wait that came then (s)."""
+        if self._backlog.flooded(now):  # nobody is waited for
+            for bunch in self._bunches.over(math.inf):
+                self._backlog.add(bunch.packets, bunch.arrivals)
+            self._backlog.add(found, arrivals)
+        else:
+            self._backlog.add(*self._bunches.pick(found, arrivals))
+
+    def _release(self, now: float) -> None:
+        """Serve the bunches that are complete, and come back when the next one is."""
+        for bunch in self._bunches.over(now):
+            self._serve(bunch.packets, bunch.arrivals[-1])
+        if self._holding is not None:
+            self._holding.cancel()
+            self._holding = None
+        if (due := self._bunches.due) < math.inf:
+            self._holding = self._loop.call_later(max(due - now, 0.0), self.read)
 
     def _clocks(self) -> tuple[float, float]:
         """The time, and the wall clock's lead; read at one moment, so that a stall does not look like a step."""

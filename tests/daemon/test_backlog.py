@@ -147,11 +147,11 @@ def test_in_a_flood_what_owners_send_together_is_served_together_before_who_send
 
 
 def test_a_source_of_many_sensors_has_saved_up_for_each_of_them() -> None:
-    for sensors in (1, 300):
-        waiting = Backlog(lambda source, sensors=sensors: sensors)
+    for owned, lost in ({ARM: 1}, True), ({ARM: 300}, False):
+        waiting = Backlog(owned.__getitem__)
         waiting.add([(FRAME, ARM)] * 300, [0.0] * 300)
-        groups, dropped = waiting.share(0.001, 0.0)
-        assert bool(dropped) == (sensors == 1)
+        _, dropped = waiting.share(0.001, 0.0)
+        assert bool(dropped) == lost
 
 
 def test_a_packet_that_costs_more_than_a_turn_has_its_turn_in_the_end() -> None:

@@ -1,5 +1,6 @@
 """The way in on a machine made of arithmetic: a clock, a kernel's buffer, and work that takes its time."""
 
+import math
 import struct
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -22,6 +23,7 @@ START_S = 1000.0
 STOP_S = 1.3
 TURN_S = 1e-5  # of the loop, besides what is done in it
 READ_S = 3e-6  # what it takes to read a packet
+RUBBISH = b"x"  # with which packets begin whose senders own no sensor
 BUFFER_BYTES = 208 << 10  # what the kernel grants whoever may not ask for more
 
 Sent = tuple[float, bytes, Source]  # s, a packet, and who sends it
@@ -46,7 +48,9 @@ class Machine:
 
     def __init__(self, sent: Iterable[Sent], cost: Callable[[bytes], float], stops: Collection[int] = ()) -> None:
         self.now, self.worked_s = START_S, 0.0
-        self.admitted: list[float] = []  # s, when packets came for which there was room
+        # s, when packets came for which there was room and which were not served yet, by packet and source
+        self.waiting: dict[tuple[bytes, Source], deque[float]] = {}
+        self.admitted = 0  # packets for which there was room
         self.served: list[tuple[bytes, Source]] = []
         self.owners: dict[Source, int] = {}  # sensors of those who were served before the last tick
         self.each = 1  # sensors that a source owns
@@ -82,7 +86,8 @@ class Machine:
                 self._dropped += 1
             else:
                 self._buffer.append(one)
-                self.admitted.append(one[0])
+                self.admitted += 1
+                self.waiting.setdefault(one[1:], deque()).append(one[0])
                 self._size += len(one[1])
 
     def clock(self) -> float:
@@ -144,7 +149,10 @@ class Machine:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
         self.received += 1
         for packet, source in packets:
-            came = self.admitted[len(self.served)]
+            times = self.waiting[packet, source]
+            came = times.popleft()
+            if not times:
+                del self.waiting[packet, source]
             self.moved_s = max(self.moved_s, abs(now - came))
             self.latest_s = max(self.latest_s, self.now - came)
             self.work(self._cost(packet))
@@ -158,7 +166,9 @@ class Machine:
         return []
 
     def wait(self, now: float) -> list[Any]:
-        assert now <= min(self.admitted[len(self.served) :], default=now) + 1e-6, "time decides beyond what was served"
+        assert now <= min((times[0] for times in self.waiting.values()), default=now) + 1e-6, (
+            "time decides beyond what was served"
+        )
         if now >= self.due:
             self.waits_s.append(self.now - self.due)
             self.due = float("inf")
@@ -189,7 +199,7 @@ def run(machine: Machine, seconds: float, look: Callable[[Receiver], None] = lam
         def tick() -> None:
             machine.call_later(TICK_S, tick)
             receiver.read()
-            machine.owners = {source: machine.each for _, source in machine.served}
+            machine.owners = {source: machine.each for packet, source in machine.served if packet[:1] != RUBBISH}
 
         tick()
         while machine.now < START_S + seconds:
@@ -206,18 +216,18 @@ def sensors(count: int, frames: int) -> list[Sent]:
 @given(st.sets(st.integers(0, 6000), max_size=4), st.sampled_from([3e-6, 2e-4]))
 def test_wherever_it_stands_still_all_that_arrived_is_served_and_no_frame_moves(stops: set[int], cost_s: float) -> None:
     """A stranger's rubbish lies before the frames, more than a read takes, and a stop may begin at any moment."""
-    rubbish = [(t + n * 1e-6, b"x" * 100, ("10.0.0.9", 1)) for t in (0.5, 1.5, 2.5) for n in range(1000)]
+    rubbish = [(t + n * 1e-6, RUBBISH * 100, ("10.0.0.9", 1)) for t in (0.5, 1.5, 2.5) for n in range(1000)]
     machine = Machine([*sensors(4, 60), *rubbish], lambda packet: cost_s, stops)
     machine.due_s = 0.1
 
     def look(receiver: Receiver) -> None:
         machine.clock()  # where it may stand still, too
-        waiting = machine.admitted[len(machine.served) :]  # packets are served in the order in which they came
+        waiting = [times[0] for times in machine.waiting.values()]
         assert receiver.served <= min(waiting, default=machine.now) + 1e-6  # s; the kernel counts nanoseconds
         assert waiting or receiver.served > machine.now - STOP_S * (len(stops) + 1)
 
     run(machine, 8.0, look)
-    assert len(machine.served) == len(machine.admitted)
+    assert len(machine.served) == machine.admitted
     assert machine.moved_s < TOGETHER_S  # packets that arrived together have one time
 
 
@@ -230,6 +240,30 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
     machine = Machine(pairs, lambda packet: 1e-5)
     run(machine, 5.0)
     assert len(machine.served) == 100 and machine.received <= received and machine.latest_s < latest_s + 1e-4
+
+
+@pytest.mark.parametrize("apart_s", [0.0, 0.0002, 0.001, 0.003])
+def test_what_the_way_held_up_is_taken_at_once_and_others_do_not_wait_for_it(apart_s: float) -> None:
+    """As Wi-Fi does: for 0.3 s nothing of one sensor passes, and then all of it, each packet a little after another."""
+    good = sensors(2, 90)
+    late: list[Sent] = []
+    for n in range(90):
+        t, turn = 0.015 + n / 15, 2.0 * (n // 30)
+        behind = n - math.ceil((turn + 1.7 - 0.015) * 15)  # how many are held up before it
+        passes = t if behind < 0 else turn + 2.0 + behind * apart_s
+        late.append((passes, b"%d" % n, ("10.0.0.2", 1)))
+    machine = Machine([*good, *late], lambda packet: 1e-4)
+    taken: list[list[int]] = []
+    receive = machine.receive
+
+    def look(packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
+        taken.append([int(packet) for packet, (host, _) in packets if host == "10.0.0.2"])
+        assert all(host == "10.0.0.2" or machine.now - now < 1e-3 for _, (host, _) in packets)
+        return receive(packets, now)
+
+    machine.receive = look  # type: ignore[method-assign]
+    run(machine, 7.0)
+    assert [len(some) for some in taken if len(some) > 1] == [4] * 3 and sum(taken, []) == list(range(90))
 
 
 @pytest.mark.parametrize("ports", [1, 20, 58])

@@ -1,0 +1,89 @@
+"""Packets of a sensor that were held up on their way, as by Wi-Fi, and arrive right after each other."""
+
+import math
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+from typing import NamedTuple
+
+from gestured.core.owner import Source
+from gestured.daemon.backlog import GROUP_BYTES, TOGETHER_S, Packet
+
+QUIET_S = 0.2  # without a packet of a source; the next one may be the first of a bunch. Less is no hole in a contact
+MOST_S, MOST = 0.05, 128  # that a bunch is waited for, and packets of one
+REMEMBERED_SOURCES = 4096  # of which it is known when they were heard last
+
+
+class Bunch(NamedTuple):
+    """Packets of one source that came after a pause, each at most TOGETHER_S after the one before it."""
+
+    packets: list[Packet]
+    arrivals: list[float]  # s, monotonic
+
+    @property
+    def over(self) -> float:
+        """When it is complete unless another packet comes before, in s."""
+        if len(self.packets) >= MOST or sum([len(packet) for packet, _ in self.packets]) >= GROUP_BYTES:
+            return self.arrivals[0]
+        return min(self.arrivals[-1] + TOGETHER_S, self.arrivals[0] + MOST_S)
+
+
+class Bunches:
+    """Holds back what comes after a pause for some milliseconds, until all that comes with it is there.
+
+    Frames without a time of their own are dated by their arrival. What a way holds up arrives late, but in one bunch;
+    if its frames are given to the hub together, it spaces them over the pause, in which they were felt. Given one by
+    one, they would be a hole and then a hurry.
+    """
+
+    def __init__(self, owns: Callable[[Source], bool]) -> None:
+        """`owns` says whether a source owns a sensor; others are not waited for."""
+        self._owns = owns
+        self._heard: dict[Source, float] = {}  # s, when each source was heard last
+        self._held: dict[Source, Bunch] = {}
+
+    @property
+    def oldest(self) -> float:
+        """When the oldest packet that is held back came, in s; infinite where there is none."""
+        return min((bunch.arrivals[0] for bunch in self._held.values()), default=math.inf)
+
+    @property
+    def due(self) -> float:
+        """When `over` will give something, in s."""
+        return min((bunch.over for bunch in self._held.values()), default=math.inf)
+
+    def pick(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> tuple[list[Packet], list[float]]:
+        """Take out of packets, in the order of their arrival (s), what belongs to bunches; the others, and theirs."""
+        heard, held = self._heard, self._held
+        if len(heard) > REMEMBERED_SOURCES:
+            heard.clear()
+        others: list[tuple[float, Packet]] = []
+        for packet, arrival in zip(packets, arrivals, strict=True):
+            source = packet[1]
+            before = heard.get(source, arrival)
+            heard[source] = arrival
+            if source in held and arrival > held[source].over:  # we were late ourselves: it is complete since then
+                complete = held.pop(source)
+                others += [(complete.arrivals[-1], one) for one in complete.packets]
+            if source in held or (arrival - before >= QUIET_S and self._owns(source)):
+                bunch = held.setdefault(source, Bunch([], []))
+                bunch.packets.append(packet)
+                bunch.arrivals.append(arrival)
+            else:
+                others.append((arrival, packet))
+        others.sort(key=itemgetter(0))
+        return [packet for _, packet in others], [arrival for arrival, _ in others]
+
+    def over(self, now: float) -> list[Bunch]:
+        """The bunches that are complete at `now` (s); those that ended together are one."""
+        if now < self.due:
+            return []
+        complete = {source: bunch for source, bunch in self._held.items() if bunch.over <= now}
+        found: list[Bunch] = []
+        for source, bunch in sorted(complete.items(), key=lambda item: item[1].arrivals[-1]):
+            del self._held[source]
+            if found and bunch.arrivals[-1] - found[-1].arrivals[0] < TOGETHER_S:
+                found[-1].packets.extend(bunch.packets)
+                found[-1].arrivals.extend(bunch.arrivals)
+            else:
+                found.append(bunch)
+        return found
