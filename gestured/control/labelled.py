@@ -21,7 +21,7 @@ from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
 SOURCE = Address("127.0.0.1", 9)  # a sender to stand for the file; port 9 discards, and nobody sends from it
-STANDS_OUT = 0.5  # of the farthest that any taxel comes: more than noise, and where a finger presses
+STANDS_OUT = 0.5  # share of the largest excursion of any taxel, from which on a touch has begun: far above the noise
 DIFFERENT = ("wrong", "missed", "false")
 
 
@@ -93,7 +93,8 @@ class Labelled:
                     raise RecordingError(
                         f"{self._path}: event_labels: recording {g} is a session whose events are not known"
                     )
-            elif found.onsets is not None or label != NONE:  # of other things all is false, whenever they began
+            # What is said of a non-gesture is false whenever it began, so nobody needs to know when that was.
+            elif found.onsets is not None or label != NONE:
                 times = found.times_of(g)
                 first = stands_out(found.frames_of(g)) if found.onsets is None else int(found.onsets[g])
                 last = -1 if found.releases is None else int(found.releases[g])

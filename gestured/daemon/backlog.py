@@ -11,15 +11,15 @@ from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
-LIGHT_BYTES = 4 << 10  # that an owner of a sensor may send in a turn of a flood, to be served together with others
+LIGHT_BYTES = 4 << 10  # owners of sensors who send no more in a turn of a flood are served together
 GROUP, GROUP_BYTES = 256, 128 << 10  # packets, and bytes of several packets, in one go at the most
 ROOM_BYTES = 52 << 10  # a quarter of the smallest buffer that a kernel grants
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
 FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
 OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
-# s of work that a sender may save up and begins with, for each sensor that it owns: the price of the largest packet of
-# frames.
+# s of work that a sender begins with, and may save up, for each sensor that it owns; a stranger for one. It is the
+# price of the largest packet of frames.
 CREDIT_S = 0.02
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
 NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
@@ -49,8 +49,9 @@ class Backlog:
     """The packets that were read and not yet served, oldest first.
 
     In a flood, work is shared out: in each turn every sender gets the same time, what one does not need goes to the
-    others, and what is too much is dropped, the oldest first. Who needs least is served first. A source that owns a
-    sensor counts for itself and comes before strangers; all strangers of one host are one sender, however many ports
+    others, and what is too much is dropped, the oldest first. Owners of sensors who send little are served first, and
+    together, since a frame costs several times less beside others than alone; then who needs least. A source that owns
+    a sensor counts for itself and comes before strangers; all strangers of one host are one sender, however many ports
     they open.
     """
 
@@ -194,7 +195,7 @@ class Backlog:
 
 
 def _groups(datagrams: Sequence[Datagram]) -> list[Group]:
-    """What a sender sent, oldest first, in groups: that a frame costs less beside others holds in a flood, too."""
+    """Datagrams, oldest first, in groups of those that arrived together."""
     groups: list[list[Datagram]] = []
     for datagram in datagrams:
         if not groups or datagram.arrival - groups[-1][0].arrival >= TOGETHER_S:

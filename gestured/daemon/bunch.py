@@ -8,16 +8,16 @@ from typing import NamedTuple
 from gestured.core.owner import Source
 from gestured.daemon.backlog import GROUP_BYTES, TOGETHER_S, Packet
 
-QUIET_S = 0.2  # without a packet of a source; the next one may be the first of a bunch. Less is no hole in a contact
-MOST_S, MOST = 0.05, 128  # that a bunch is waited for, and packets of one
-REMEMBERED_SOURCES = 4096  # of which it is known when they were heard last
+QUIET_S = 0.2  # after so long without a packet of a source a bunch may come; a shorter pause is no hole in a contact
+MOST_S, MOST = 0.05, 128  # seconds that a bunch is waited for, and packets of a bunch, at the most
+REMEMBERED_SOURCES = 4096  # sources of which it is remembered when they were heard last
 
 
 class Bunch(NamedTuple):
     """Packets of one source that came after a pause, each at most TOGETHER_S after the one before it."""
 
     packets: list[Packet]
-    arrivals: list[float]  # s, monotonic
+    arrivals: list[float]  # s, monotonic, of each packet
 
     @property
     def over(self) -> float:
@@ -31,13 +31,13 @@ class Bunches:
     """Holds back what comes after a pause for some milliseconds, until all that comes with it is there.
 
     Frames without a time of their own are dated by their arrival. What a way holds up arrives late, but in one bunch;
-    if its frames are given to the hub together, it spaces them over the pause, in which they were felt. Given one by
-    one, they would be a hole and then a hurry.
+    if its frames are given to the hub together, it spaces them at the sensor's usual rate, up to their arrival. Given
+    one by one, they would look like a hole in the contact, and then like frames at a much higher rate.
     """
 
-    def __init__(self, owns: Callable[[Source], bool]) -> None:
-        """`owns` says whether a source owns a sensor; others are not waited for."""
-        self._owns = owns
+    def __init__(self, owned: Callable[[Source], int]) -> None:
+        """`owned` says how many sensors a source owns; there is no waiting for a source that owns none."""
+        self._owned = owned
         self._heard: dict[Source, float] = {}  # s, when each source was heard last
         self._held: dict[Source, Bunch] = {}
 
@@ -48,11 +48,14 @@ class Bunches:
 
     @property
     def due(self) -> float:
-        """When `over` will give something, in s."""
+        """When the next bunch is complete unless more packets come before, in s; infinite where there is none."""
         return min((bunch.over for bunch in self._held.values()), default=math.inf)
 
     def pick(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> tuple[list[Packet], list[float]]:
-        """Take out of packets, in the order of their arrival (s), what belongs to bunches; the others, and theirs."""
+        """Hold back the packets that belong to bunches; gives the others, and when they arrived (s).
+
+        Packets are given in the order of their `arrivals`.
+        """
         heard, held = self._heard, self._held
         if len(heard) > REMEMBERED_SOURCES:
             heard.clear()
@@ -61,10 +64,10 @@ class Bunches:
             source = packet[1]
             before = heard.get(source, arrival)
             heard[source] = arrival
-            if source in held and arrival > held[source].over:  # we were late ourselves: it is complete since then
+            if source in held and arrival > held[source].over:  # complete before this packet came, but read with it
                 complete = held.pop(source)
                 others += [(complete.arrivals[-1], one) for one in complete.packets]
-            if source in held or (arrival - before >= QUIET_S and self._owns(source)):
+            if source in held or (arrival - before >= QUIET_S and self._owned(source)):
                 bunch = held.setdefault(source, Bunch([], []))
                 bunch.packets.append(packet)
                 bunch.arrivals.append(arrival)

@@ -243,6 +243,6 @@ REPEATED = ("fallback", "publish", "allow")
 
 
 def as_written(key: str, sources: Mapping[str, str]) -> str:
-    """A setting's name as its source has it: in a file with a table of the same name it stands there."""
+    """A setting's name as its source has it: `gestures` is `gestures.use` in a file with a table [gestures]."""
     table, inner = INSIDE.get(key, ("", ""))
     return f"{key}.{inner}" if inner and sources.get(table) == sources.get(key) else TITLES.get(key, key)

@@ -18,6 +18,7 @@ from itertools import chain
 import numpy as np
 
 from gestured.core.hub import Hub
+from gestured.core.owner import Source
 from gestured.daemon.backlog import FLOOD_S, GROUP, GROUP_BYTES, TOGETHER_S, Backlog, Packet
 from gestured.daemon.bunch import Bunches
 from gestured.daemon.desk import Desk
@@ -56,8 +57,11 @@ class Receiver:
         """Give `hub` the packets since the socket was `empty` (s), and its facts to `desk`; `taps` see the packets."""
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
-        self._backlog = Backlog(lambda source: hub.owners.get(source, 0))
-        self._bunches = Bunches(lambda source: source in hub.owners)
+
+        def owned(source: Source) -> int:
+            return hub.owners.get(source, 0)  # each tick of the hub makes the table anew
+
+        self._backlog, self._bunches = Backlog(owned), Bunches(owned)
         self._muted = Muted()
         _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
         self._empty = empty  # s: what arrived until then was read
@@ -72,7 +76,7 @@ class Receiver:
         self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
-        self._holding: asyncio.TimerHandle | None = None  # until the next bunch is complete
+        self._holding: asyncio.TimerHandle | None = None  # it reads again when the next bunch is complete
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
         self._asking: asyncio.Handle | None = None
@@ -142,8 +146,8 @@ class Receiver:
             self._again = self._loop.call_soon(self.read)
 
     def _put(self, found: list[Packet], arrivals: list[float], now: float) -> None:
-        """Let packets wait that came then (s)."""
-        if self._backlog.flooded(now):  # nobody is waited for
+        """Put packets with these arrivals (s) into the backlog, but for those that are held back for their bunch."""
+        if self._backlog.flooded(now):  # what comes is too much already: no bunch is waited for
             for bunch in self._bunches.over(math.inf):
                 self._backlog.add(bunch.packets, bunch.arrivals)
             self._backlog.add(found, arrivals)

@@ -12,7 +12,7 @@ from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES, named
 from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
-# By pydantic's types of errors, what was expected, where its own words are those of a programmer.
+# What was expected, by pydantic's type of an error, where pydantic's own message speaks of Python's types.
 WORDS = {
     "tuple_type": "a list",
     "string_too_short": "a text that is not empty",

@@ -24,7 +24,7 @@ CACHE = Path(".cache/lab")
 MODELS = Path("models")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
-KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # what is finished, for the same command again
+KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that go on where they were interrupted
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",

@@ -88,7 +88,7 @@ def test_a_contact_is_none_where_more_than_half_of_the_taxels_jump(rows: int, ex
 
 @pytest.mark.parametrize(("every", "expected"), [(7, ["held", "Gesture"]), (9, ["held"])])
 def test_what_is_wider_than_fingers_twice_a_second_is_learned_like_an_arm(every: int, expected: list[str]) -> None:
-    """It lies there for three seconds before the swipe; what could be fingers is one contact with that for five."""
+    """An elbow lies there for three seconds before the swipe. If it was not learned, both are one contact."""
     elbow = np.zeros(SHAPE)
     elbow[3:6, 0:2] = elbow[4, 2] = GAIN / 4
     swiped: Action = (0.4, lambda share: finger(7 - 6 * share, 7, SHAPE) + elbow)
@@ -99,7 +99,7 @@ def test_what_is_wider_than_fingers_twice_a_second_is_learned_like_an_arm(every:
 
 
 def test_a_swipe_just_after_a_thing_has_left_counts_though_the_bare_sensor_has_sunk_meanwhile() -> None:
-    """By a thirteenth of the thing's activity, which is that of its strongest spot."""
+    """The sensor sinks by a thirteenth of the activity that the thing had, while that lies there."""
     thing: Action = (28.0, lambda share: finger(4, 4, SHAPE, width=1.5) / 2)
     times, frames = stream(SHAPE, [quiet(2), thing, quiet(0.35), SWIPE, quiet(2)])
     frames -= np.interp(times, [10, 27], [0, 40])[:, None, None]
@@ -107,7 +107,7 @@ def test_a_swipe_just_after_a_thing_has_left_counts_though_the_bare_sensor_has_s
 
 
 def test_a_swipe_just_after_a_hand_has_left_counts_though_it_left_little_bare_from_the_start() -> None:
-    """It lay there when the sensor was learned, left for half a second, and lay there again, on eight rows of nine."""
+    """The hand covers eight rows of nine while the sensor is learned, leaves for half a second, and comes back."""
     hand = np.zeros(SHAPE)
     hand[1:] = GAIN / 5
     first, again = ((seconds, lambda share: hand) for seconds in (2.0, 4.0))

@@ -113,7 +113,7 @@ def test_the_forest_alone_opens_no_network(used: Used) -> None:
 
 
 def test_finger_positions_are_passed_over(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing in the daemon asks for them: with a frame or without, they leave no trace but where they are none."""
+    """The daemon reads no trajectory. One with wrong type tags, or with too many fingers, is counted as dropped."""
 
     def trajectory(sensor: str, types: str = "iffiff") -> bytes:
         return encoding.message(f"/{sensor}/trajectory", types, ([1, 4.0, 4.0] * 5)[: len(types)])

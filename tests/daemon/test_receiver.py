@@ -54,8 +54,11 @@ class Machine:
         self.served: list[tuple[bytes, Source]] = []
         self.owners: dict[Source, int] = {}  # sensors of those who were served before the last tick
         self.each = 1  # sensors that a source owns
-        self.due, self.due_s = float("inf"), float("inf")  # s, when time alone decides; so long after a packet
-        self.waits_s: list[float] = []  # by which it was decided later than that
+        self.due, self.due_s = (
+            float("inf"),
+            float("inf"),
+        )  # s, when time alone decides, and how long after a packet that is
+        self.waits_s: list[float] = []  # how long after `due` each decision came
         self._sent, self._cost = deque((START_S + t, packet, source) for t, packet, source in sorted(sent)), cost
         self._buffer: deque[Sent] = deque()
         self._size = self._dropped = self._looks = 0

@@ -91,7 +91,7 @@ def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.soc
     assert sent()[1:] == [["alive", 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", 7]]  # lower numbers are late
     again.publish(Touch("arm", 8, 0, "down", 12.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
     assert sent()[1][:3] == ["alive", 1, 2]
-    again.close()  # whoever draws is told that they are no more
+    again.close()  # which tells programs that draw that no finger is left
     assert [sent()[1:] for _ in "12"] == [[["alive"], ["fseq", 3]], [["alive"], ["fseq", 9]]]
 
 
