@@ -5,6 +5,8 @@ gestured/{site}/alive               liveliness token of the daemon
 gestured/{site}/{sensor}/alive      liveliness token of a sensor that is heard
 gestured/{site}/hello               asked (get): the daemon's hello; {sensor}/gesture asked: the sensor's last gesture
 gestured/{site}/{sensor}/frames     in: OSC packets as over UDP, with counter and time; of this sensor alone
+
+With --ros2 the events are ROS 2 topics instead, as rmw_zenoh has them: `zenoh_ros.py` says which.
 """
 
 import argparse
@@ -14,6 +16,7 @@ from pathlib import Path
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.options import add_destination, add_filters, add_metrics, need, subscriber
+from gestured.bridge.zenoh_ros import Ros
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
 from gestured.client.program import Commands, on_stop
 from gestured.client.values import sensor_name
@@ -28,7 +31,8 @@ def add(commands: Commands) -> None:
         help="events to Zenoh, and frames from there",
         description="Publish events under gestured/SITE/SENSOR/TYPE, with liveliness tokens for daemon and sensors.",
         epilog="examples:\n  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
-        "  gestured-bridge zenoh --frames --to 127.0.0.1:9000",
+        "  gestured-bridge zenoh --frames --to 127.0.0.1:9000\n"
+        "  ROS_DOMAIN_ID=7 gestured-bridge zenoh --ros2",
     )
     text = f"a router or peer to call; may be repeated (default: {ROUTER})"
     parser.add_argument("--connect", action="append", metavar="ENDPOINT", help=text)
@@ -37,7 +41,10 @@ def add(commands: Commands) -> None:
     text = "name of this place in keys (default: the hostname)"
     parser.add_argument("--site", type=sensor_name, metavar="NAME", help=text)
     add_filters(parser)
-    parser.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")
+    text = "events as topics of ROS 2, for nodes with rmw_zenoh; --site is the namespace (default: none)"
+    either.add_argument("--ros2", action="store_true", help=text)
     add_destination(parser)
     add_metrics(parser)
     parser.set_defaults(run=run)
@@ -47,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     """Mirror events until SIGTERM or Ctrl-C."""
     need("zenoh", "eclipse-zenoh", "zenoh")
     counts = Counts("zenoh")
-    bridge = Zenoh(args, counts)
+    bridge = Ros(args, counts) if args.ros2 else Zenoh(args, counts)
     source = subscriber(args, NOTICE_S, counts.wrong)
     on_stop(source.close)
     try:

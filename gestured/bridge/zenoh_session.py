@@ -38,7 +38,7 @@ class Zenoh:
         self._forward = Forward(self._key(), args.to, counts) if args.frames else None
         self._session: Any = None
         self._tokens: dict[str, Any] = {}
-        self._holding = threading.Lock()  # for the tokens: the thread that opens the session holds them first
+        self._holding = threading.Lock()  # for what is announced: the thread that opens the session does it first
         self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
         self._closed = threading.Event()
         self._opening = threading.Thread(target=self._open, name="zenoh", daemon=True)
@@ -52,7 +52,7 @@ class Zenoh:
         self._daemon.take(line)
         if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._publish(line)
-        self._hold_tokens()
+        self._keep_up()
 
     def close(self, patience_s: float | None = None) -> bool:
         """Leave the network: tell it that this session ends.
@@ -91,18 +91,22 @@ class Zenoh:
                 self._closed.wait(pause)
                 pause = min(2 * pause, LONGEST_S)
                 continue
-            # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
-            self._answers = session.declare_queryable(self._key("**"), Callback(self._answer, indirect=False))
+            self._serve(session)
             self._session = session
-            self._hold_tokens()
+            self._keep_up()
             if self._forward is not None:
                 take = Callback(self._forward.take, indirect=False)
                 self._forward.hear(partial(session.declare_subscriber, handler=take))
             return
 
-    def _publish(self, event: Line) -> None:
-        import zenoh
+    def _serve(self, session: Any) -> None:
+        """Answer what latecomers ask."""
+        from zenoh.handlers import Callback
 
+        # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
+        self._answers = session.declare_queryable(self._key("**"), Callback(self._answer, indirect=False))
+
+    def _publish(self, event: Line) -> None:
         data = self._daemon.payload(event)
         if event["type"] == "gesture":
             if event["sensor"] not in self._latest and len(self._latest) >= MOST_SENSORS:
@@ -113,9 +117,14 @@ class Zenoh:
         elif not self._reached():
             self._counts.add("events", "unheard")
         else:
-            key = self._key(event["sensor"], event["type"])
-            self._session.put(key, data, encoding=zenoh.Encoding.APPLICATION_JSON)
+            self._put(event, data)
             self._counts.add("events", "sent")
+
+    def _put(self, event: Line, data: bytes) -> None:
+        import zenoh
+
+        key = self._key(event["sensor"], event["type"])
+        self._session.put(key, data, encoding=zenoh.Encoding.APPLICATION_JSON)
 
     def _reached(self) -> bool:
         """Whether a router or a peer is there now; said where that changes."""
@@ -126,21 +135,25 @@ class Zenoh:
         self._counts.connected("zenoh", there, "Zenoh is there" if there else "no router and no peer; trying again")
         return there
 
-    def _hold_tokens(self) -> None:
-        """A token for the daemon and for each sensor that is heard now."""
+    def _keep_up(self) -> None:
+        """Tell Zenoh what is there now, and say once that all is."""
         if self._session is None:
             return
         with self._holding:
-            alive = set()
-            if self._daemon.hello:
-                heard = (name for name, state in self._daemon.states.items() if state in HEARD)
-                alive = {self._key("alive"), *(self._key(name, "alive") for name in heard)}
-            for key in self._tokens.keys() - alive:
-                self._tokens.pop(key).undeclare()
-            for key in alive - self._tokens.keys():
-                self._tokens[key] = self._session.liveliness().declare_token(key)
+            self._announce()
         if self._reached() and self._daemon.hello:
             self._counts.ready(site=self._site)
+
+    def _announce(self) -> None:
+        """Hold a token for the daemon and for each sensor that is heard now."""
+        alive = set()
+        if self._daemon.hello:
+            heard = (name for name, state in self._daemon.states.items() if state in HEARD)
+            alive = {self._key("alive"), *(self._key(name, "alive") for name in heard)}
+        for key in self._tokens.keys() - alive:
+            self._tokens.pop(key).undeclare()
+        for key in alive - self._tokens.keys():
+            self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def _answer(self, query: Any) -> None:
         """What a latecomer asks for; called by Zenoh in a thread of its own."""

@@ -187,3 +187,13 @@ def broker(tmp_path: Path) -> Iterator[Callable[..., Broker]]:
     yield begin
     for each in running:
         each.kill()
+
+
+@pytest.fixture
+def site() -> Iterator[Any]:
+    """A router of Zenoh, and a client of it that hears all: skipped without Zenoh."""
+    from tests.bridge.zenoh_site import Site
+
+    site = Site()
+    yield site
+    site.close()

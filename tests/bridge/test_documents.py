@@ -10,15 +10,12 @@ from types import SimpleNamespace
 import pytest
 
 from gestured.control.cli import main
-from tests.bridge import test_zenoh
+from tests.bridge import zenoh_site
 from tests.bridge.conftest import emit
 from tests.bridge.test_mqtt import begin
 from tests.bridge.test_serial import Out
-from tests.bridge.test_zenoh import site
 from tests.daemon.harness import Daemon
 from tests.documents.blocks import blocks
-
-__all__ = ["site"]  # a fixture
 
 
 def consumer(phrase: str) -> str:
@@ -65,14 +62,14 @@ def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
 
 
 def test_the_zenoh_consumer(bridge, site, daemon: Daemon):
-    test_zenoh.begin(bridge, site, daemon).ready()
+    zenoh_site.begin(bridge, site, daemon).ready()
     code = consumer("declare_subscriber").replace("tcp/192.168.7.2:7447", site.endpoint)
     assert heard(code, daemon) == {"armrest swipe_left\n"}
 
 
 def test_the_zenoh_sender(bridge, site, fake, udp):
     to = f"127.0.0.1:{udp.getsockname()[1]}"
-    process = test_zenoh.begin(bridge, site, fake, "--frames", "--to", to)
+    process = zenoh_site.begin(bridge, site, fake, "--frames", "--to", to)
     fake.accept()
     process.ready()
     code = consumer("declare_publisher").replace("tcp/192.168.7.2:7447", site.endpoint).replace("car7", "car")

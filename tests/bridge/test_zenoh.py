@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,76 +24,11 @@ from gestured.bridge.zenoh_session import Zenoh
 from gestured.core.address import Address
 from tests.bridge.conftest import Process, emit, page, wait
 from tests.bridge.test_mqtt import STATUS, gesture
+from tests.bridge.zenoh_site import Site, begin, opened
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted
 from tests.sockets import HELLO, FakeDaemon, free_address
 
 zenoh = pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
-
-
-def opened(mode: str, *, listen: str = "", connect: str = "") -> Any:
-    """A session that looks for nobody by itself."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": mode,
-        "listen/endpoints": [listen] if listen else [],
-        "connect/endpoints": [connect] if connect else [],
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return zenoh.open(config)
-
-
-class Site:
-    """A router, and a client of it that hears all."""
-
-    def __init__(self) -> None:
-        self.endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
-        self.router = opened("router", listen=self.endpoint)
-        self.client = opened("client", connect=self.endpoint)
-        self.samples: queue.Queue[Any] = queue.Queue()
-        self.tokens: queue.Queue[tuple[str, bool]] = queue.Queue()
-        self._hears = self.client.declare_subscriber("gestured/**", self.samples.put)
-        self._sees = self.client.liveliness().declare_subscriber(
-            "gestured/**", lambda sample: self.tokens.put((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
-        )
-
-    def event(self) -> tuple[str, dict[str, Any]]:
-        """The next event, and its key."""
-        sample = self.samples.get(timeout=DEADLINE_S)
-        return str(sample.key_expr), json.loads(sample.payload.to_bytes())
-
-    def token(self) -> tuple[str, bool]:
-        """The next token that comes (True) or goes."""
-        return self.tokens.get(timeout=DEADLINE_S)
-
-    def get(self, key: str) -> dict[str, Any]:
-        """What is answered to a question."""
-        replies = self.client.get(key)
-        return {str(reply.ok.key_expr): json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok}
-
-    def publisher(self, key: str) -> Any:
-        """For what somebody else than this site hears: its router knows of it."""
-        publisher = self.client.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE)
-        wait(lambda: publisher.matching_status.matching)
-        return publisher
-
-    def close(self) -> None:
-        self.client.close()
-        self.router.close()
-
-
-@pytest.fixture
-def site() -> Iterator[Site]:
-    site = Site()
-    yield site
-    site.close()
-
-
-def begin(bridge: Callable[..., Process], site: Site, daemon: Any, *more: object) -> Process:
-    """A bridge of the site `car`."""
-    path = daemon.path if isinstance(daemon, FakeDaemon) else daemon.socket
-    return bridge("zenoh", "--connect", site.endpoint, "--site", "car", "--socket", path, *more)
 
 
 def test_a_real_daemons_events_arrive(bridge, site, daemon: Daemon):
@@ -345,7 +280,7 @@ def unconnected() -> Zenoh:
 def test_a_line_that_comes_while_the_session_is_opened_declares_no_token_twice():
     """The one that is thrown away would be undeclared, and tell others that the daemon is gone."""
     bridge, declared = unconnected(), list[str]()
-    other = threading.Thread(target=bridge._hold_tokens)
+    other = threading.Thread(target=bridge._keep_up)
 
     def declare(key: str) -> object:
         declared.append(key)
@@ -358,7 +293,7 @@ def test_a_line_that_comes_while_the_session_is_opened_declares_no_token_twice()
     liveliness = SimpleNamespace(declare_token=declare)
     info = SimpleNamespace(routers_zid=lambda: ["router"])
     bridge._session = SimpleNamespace(liveliness=lambda: liveliness, info=info)
-    bridge._hold_tokens()
+    bridge._keep_up()
     other.join()
     assert declared == ["gestured/car/alive"]
 

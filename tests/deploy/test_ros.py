@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 import gestured
 from deploy.ros2.gestured_ros2.gestured_ros2.frames import values_of
-from deploy.ros2.gestured_ros2.gestured_ros2.names import sensor_of, token
+from gestured.bridge.ros_names import sensor_of, token
 from gestured.client.control import Control
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import wait

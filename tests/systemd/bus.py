@@ -10,7 +10,7 @@ import paho.mqtt.client as mqtt
 import zenoh
 from paho.mqtt.enums import CallbackAPIVersion
 
-from tests.bridge.test_zenoh import opened
+from tests.bridge.zenoh_site import opened
 
 ROUTER = "tcp/127.0.0.1:7447"
 

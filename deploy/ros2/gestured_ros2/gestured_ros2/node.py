@@ -24,6 +24,7 @@ from std_srvs.srv import SetBool
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, NOTICE_S, Daemon, Line, follow
 from gestured.bridge.gates import OFF, ON, Gate
+from gestured.bridge.ros_names import token
 from gestured.client.sensor import Form, sent_after_refusal
 from gestured.client.subscriber import Subscriber
 from gestured.core.address import Address, is_sensor
@@ -32,7 +33,6 @@ from gestured.core.frames import Frame
 
 from .frames import values_of
 from .messages import filled, own_messages
-from .names import token
 
 EVENTS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
