@@ -93,7 +93,7 @@ class Sensor:
         self.unheard = 0  # packets to which a closed port answered
         self.start = time.monotonic()
         self.epoch = time.time()
-        self.stop = threading.Event()
+        self.begun, self.stop = threading.Event(), threading.Event()
 
     def send(self, frames: Iterable[tuple[int, Frame]]) -> None:
         """Send (counter, frame) until they end or `stop` is set. A late frame goes out at once."""
@@ -103,6 +103,7 @@ class Sensor:
                 return
             self.unheard += sent_after_refusal(self.socket, self.form.packet(frame, counter, self.moment(frame.t)))
             self.sent += 1
+            self.begun.set()
 
     def moment(self, t: float) -> float:
         """The time `t` of a frame in seconds since the Unix epoch."""

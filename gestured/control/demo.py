@@ -34,6 +34,7 @@ DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
+BEGUN_S = 5.0  # in which the simulated sensor has surely sent something, unless it fails
 GONE_S = 3.0  # without a page a pad counts as closed: a page that is loaded again comes back within that time
 HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
 
@@ -60,15 +61,15 @@ def run(args: argparse.Namespace) -> int:
     take = performance(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
-    with Engine(args.model, rows, columns, "--flight-recorder", "4") as engine:  # the page can flag
+    with Engine(args.model, rows, columns, "--flight-recorder", "4", "--touch", "true") as engine:  # for its page
         control = Path(engine.ready["control"])
         try:
             with (
                 nullcontext("") if args.json else page(control) as address,
-                nullcontext() if args.json else pad(engine, args.grid, args.rate) as touched,
                 Subscriber(engine.socket, types=HEARD, sensors=[DEMO_SENSOR], reconnect=False) as stream,
                 show.drawn(control),
                 sending(engine.listen, take) as sensor,
+                nullcontext() if args.json else pad(engine, args.grid, args.rate, after=sensor) as touched,
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
@@ -100,8 +101,12 @@ def page(control: Path) -> Iterator[str]:
             process.wait()  # after Ctrl-C `Popen` itself waits for a quarter of a second at most
 
 
-def pad(engine: Engine, grid: tuple[int, int], rate_hz: float) -> PadServer:
-    """A pad that sends to the demo's daemon, on any free port; a context manager."""
+def pad(engine: Engine, grid: tuple[int, int], rate_hz: float, after: Sensor) -> PadServer:
+    """A pad that sends to the demo's daemon, on any free port; a context manager.
+
+    It begins after the simulated sensor, since the page shows the sensor that was heard first.
+    """
+    after.begun.wait(BEGUN_S)
     server = PadServer(Address("127.0.0.1", 0), Pad(engine.listen, "pad", grid, min(rate_hz, 200.0)), "the demo")
     return server.serve(engine.socket)
 

@@ -134,6 +134,20 @@ def test_without_a_terminal_it_says_words_and_goes_on_while_its_pad_is_open(star
     assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 
+def test_its_page_shows_the_simulated_sensor_first_and_follows_the_finger(start, shallow):
+    """The page opens with the first sensor, and nobody is on the pad; its sliders need events of the type touch."""
+    process = start("demo", "--seconds", 60, "--kinds", "swipe_up", env={"TMPDIR": str(shallow)})
+    (address,) = [line.split()[-1] for _, line in zip(range(4), process.stdout, strict=False) if b"a browser" in line]
+    stream = Page(address.decode()).come_in().stream("demo")
+    while len(sensors := list(stream.until("sensors")[1]["sensors"])) < 2:
+        pass
+    assert sensors == ["demo", "pad"]
+    assert stream.until("touch")[1]["phase"] == "down"
+    stream.close()
+    process.send_signal(signal.SIGINT)
+    assert ended(process)[0] == 0
+
+
 def test_a_model_that_cannot_be_used_is_one_sentence(start, shallow):
     status, out, err = ended(start("demo", "--model", shallow / "none.onnx", env={"TMPDIR": str(shallow)}))
     assert (status, out, err.count("\n")) == (1, "", 1)
