@@ -1,11 +1,18 @@
-"""Runs of a model that take too long are ended, and no others."""
+"""Runs of a model that take too long are ended where somebody waits for answers, and no others."""
 
+import time
 from contextlib import ExitStack
 from types import SimpleNamespace
 
 import pytest
 
 from gestured.model import limit
+
+
+@pytest.fixture(autouse=True)
+def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limit, "_hurried", False)
+    limit.hurry()
 
 
 @pytest.mark.parametrize("awake_s", [limit.AWAKE_S, 0.0], ids=["awake", "asleep"])
@@ -30,3 +37,12 @@ def test_a_run_that_was_over_in_time_is_not_ended(monkeypatch: pytest.MonkeyPatc
         while not late.terminate:
             pass
     assert not over.terminate
+
+
+def test_where_nobody_waits_for_answers_no_run_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the laboratory a busy machine would change figures, and end what has taken hours."""
+    monkeypatch.setattr(limit, "_hurried", False)
+    run = SimpleNamespace(terminate=False)
+    with limit.limited(run, 0.01):
+        time.sleep(0.1)
+    assert not run.terminate

@@ -2,11 +2,13 @@
 
 import argparse
 import json
+import math
 import socket
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -110,15 +112,16 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
 
 
 def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
+    open_ladder = partial(ladder_for, slow_s=math.inf)  # a busy machine must not change answers
     if isinstance(source, Labelled):
-        ladder = ladder_for(model or DEFAULT_MODEL)
+        ladder = open_ladder(model or DEFAULT_MODEL)
         return source.scene(ladder.gestures), ladder
     maker = source.maker
     if model is None:
         first, *others = _recorded_models(source.path, maker)
-        ladder = ladder_for(first, others or None)
+        ladder = open_ladder(first, others or None)
     else:
-        ladder = ladder_for(model)
+        ladder = open_ladder(model)
     if model is None and ladder.model.sha256 != maker.sha256:
         say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
     ladder.own = Own(maker.own, ladder.gestures)

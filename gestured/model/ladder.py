@@ -15,6 +15,7 @@ from gestured.core.frames import Segment
 from gestured.core.own import Examples
 from gestured.core.points import USUAL, Certainty
 from gestured.core.scene import Scene
+from gestured.model.limit import hurry
 from gestured.model.model import Model
 from gestured.model.own import Own
 from gestured.model.rung import Rung
@@ -29,9 +30,10 @@ class Ladder:
     """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
 
     A rung that raises or gives scores that are not finite is put aside for RETRY_S of `clock`, as is one that took more
-    than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. One that cannot be opened is put aside for
-    good. Rungs that are aside still come last, before giving up. What another rung than the first says is `degraded`.
-    Gestures of the user's own are compared by the rung that answers.
+    than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. Where `slow_s` is infinite no run is ended
+    for its length, either. One that cannot be opened is put aside for good. Rungs that are aside still come last,
+    before giving up. What another rung than the first says is `degraded`. Gestures of the user's own are compared by
+    the rung that answers.
     """
 
     def __init__(
@@ -50,6 +52,8 @@ class Ladder:
             raise ModelError("a ladder needs at least one model")
         self.rungs = tuple(Rung(source) for source in rungs)
         self._slow_s, self._clock = slow_s, clock
+        if slow_s < math.inf:
+            hurry()
         self.report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long

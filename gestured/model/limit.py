@@ -3,6 +3,9 @@
 One thread watches all models of the process. It looks now and then while models are run, and is woken only
 for a limit that ends before its next look: to wake it for each run makes every run slower. A single operator that never
 ends is not ended by this; that is the business of the watchdog outside.
+
+Nothing is ended before `hurry` was called: where nobody waits for answers, as in the laboratory or in a replay, a busy
+machine must not change them.
 """
 
 import threading
@@ -19,13 +22,23 @@ _running: dict[int, tuple[float, Any]] = {}  # by run: when its time is over (s,
 _changed = threading.Condition()
 _thread: threading.Thread | None = None
 _used = 0.0  # s, when a model was last run
+_hurried = False
 _looks = 0.0  # s, when the thread looks next
+
+
+def hurry() -> None:
+    """From now on runs that take too long are ended: somebody waits for the answers of this process."""
+    global _hurried
+    _hurried = True
 
 
 @contextmanager
 def limited(options: Any, seconds: float) -> Iterator[None]:
     """Sets `options.terminate` (of onnxruntime's RunOptions, new for each run) when the block takes longer."""
     global _thread, _used
+    if not _hurried:
+        yield
+        return
     with _changed:
         if _thread is None:
             _thread = threading.Thread(target=_watch, name="run limit", daemon=True)

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.model.ladder import Ladder
+from gestured.model.shipped import shipped
 from gestured.record import arrays as recording
 from gestured.record import tape_reader
 from gestured.record.recordings import Recordings
@@ -89,6 +91,16 @@ def test_labels_are_compared_with_what_a_model_says_of_their_recordings(replay, 
     events = [json.loads(line) for line in out.splitlines()]
     assert {event["sensor"] for event in events} == {"arm"}
     assert [e["gesture"] for e in events if e["type"] == "gesture"] == ["swipe_left", "swipe_down", "swipe_right"]
+
+
+@pytest.mark.skipif(not shipped()["cnn_lstm"].exists(), reason=f"{shipped()['cnn_lstm']} is not there")
+def test_however_slow_this_machine_is_the_first_model_answers(replay, tmp_path: Path, monkeypatch) -> None:
+    """A daemon hands over to a faster model, since somebody waits. Here a busy machine would change answers."""
+    monkeypatch.setitem(Ladder.__init__.__kwdefaults__, "slow_s", 0.0)
+    path = labelled(tmp_path / "s.npz", *(("swipe_left", Hand().swipe("left")),) * 5)
+    status, out, err = replay(path, "--model", "cnn_lstm", "--json")
+    answers = [event for event in map(json.loads, out.splitlines()) if event["type"] in ("gesture", "unknown")]
+    assert status == 0 and [event["model"] for event in answers] == ["cnn_lstm"] * 5, err
 
 
 def test_by_the_time_of_arrival_a_daemon_answers_what_is_sent_at_its_own_pace(replay, serve, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ REPLAYED_OTHERWISE = {"four sensors"}
 def model() -> Iterator[Ladder]:
     """The model that the tapes are pinned to. No run of it is ended, however busy this machine is."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gestured.model.model.RUN_S", 600.0)
+        patch.setattr("gestured.model.limit._hurried", False)
         yield path.open_model()
 
 
