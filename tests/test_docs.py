@@ -51,11 +51,13 @@ def test_each_subcommand_has_its_row_and_flags(tool: str, command: str):
     own = flags(subcommands(tool)[command])
     named = set(re.findall(r"`(--[a-z0-9-]+)`", described))
     assert named <= own
-    # The page says once, above its tables, which commands take these.
+    # The page says once, beside its tables, which commands take these.
     of_a_daemon = described in DOCUMENTS.partition("| command of a daemon |")[2].partition("\n\n")[0]
-    common = {"--json"} if tool != "gestured-bridge" else set()
+    common = {"--json"} if tool != "gestured-bridge" else {"--metrics"}
     if of_a_daemon:
         common |= {"--control", "--socket"}
+    if (tool, command) in (("gestured-bridge", "mqtt"), ("gestured-bridge", "zenoh")):
+        common |= {"--socket", "--types", "--sensors", "--gestures"}
     assert common <= own
     own -= common
     (other,) = re.findall(r"flags of `([a-z]+)`", described) or [None]
