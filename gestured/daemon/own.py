@@ -174,8 +174,8 @@ class OwnGestures:
 
         def without(found: Examples) -> Examples:
             if name not in found and name not in self._keeper.found.gestures:
-                known = ", ".join(found) or "none: nothing is enrolled"
-                raise Refusal(f"{name!r} is no gesture of your own, expected one of {known}")
+                known = f", expected one of {', '.join(found)}" if found else ": nothing is enrolled"
+                raise Refusal(f"{name!r} is no gesture of your own{known}")
             return {other: examples for other, examples in found.items() if other != name}
 
         await self._change(without)

@@ -238,7 +238,7 @@ def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin
     assert client.until(lambda line: line["type"] == "gestures")[-1]["gestures"] == list(tiny_model.GESTURES)
     assert answer(client, sensor, sensor.slash)["type"] == "unknown"
     assert json.loads(path.read_text())["gestures"] == {}
-    with pytest.raises(Refused, match="'slash' is no gesture of your own"):
+    with pytest.raises(Refused, match="'slash' is no gesture of your own: nothing is enrolled"):
         daemon.ask("forget", name="slash")
 
 
