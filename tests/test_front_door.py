@@ -1,4 +1,4 @@
-"""What `import gestured` offers: cheap until it is used, and clear about mistakes."""
+"""What `import gestured` offers: cheap until it is used, and clear about mistakes; and how its programs begin."""
 
 import json
 import subprocess
@@ -35,6 +35,25 @@ def test_importing_the_package_imports_nothing_else():
     code = "import sys; before = set(sys.modules); import gestured; print(*sorted(set(sys.modules) - before))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["gestured"]
+
+
+@pytest.mark.parametrize(
+    ("program", "status"), [("control", 1), ("bridge", 0), ("lab", 130)], ids=["gesturectl", "bridge", "lab"]
+)
+def test_ctrl_c_while_a_program_imports_its_modules_leaves_no_traceback(program: str, status: int):
+    code = """
+import sys
+class Interrupted:
+    def find_spec(self, name, *_):
+        if name == "numpy":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Interrupted())
+from gestured.{}.cli import main
+sys.exit(main())
+"""
+    command = [sys.executable, "-c", code.format(program), "--help"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", "")
 
 
 def test_what_listens_needs_neither_numpy_nor_a_model():

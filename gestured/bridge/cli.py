@@ -1,11 +1,11 @@
 """The command line of gestured-bridge: one file per bus."""
 
 from collections.abc import Sequence
+from importlib import import_module
 
-from gestured.bridge import mqtt, serial, zenoh
 from gestured.client.program import Parser, program, run
 
-BRIDGES = (mqtt, zenoh, serial)
+BRIDGES = ("mqtt", "zenoh", "serial")
 
 
 def parser() -> Parser:
@@ -18,11 +18,14 @@ def parser() -> Parser:
         "  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
         "  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32",
     )
-    for module in BRIDGES:
-        module.add(bridges)
+    for name in BRIDGES:
+        import_module(f"gestured.bridge.{name}").add(bridges)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one bridge until it is ended; returns the exit status (0 ended as asked, 1 it cannot work, 2 usage)."""
-    return run(parser(), argv)
+    try:
+        return run(parser(), argv)
+    except KeyboardInterrupt:  # while the modules of the bridges were imported
+        return 0

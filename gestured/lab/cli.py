@@ -14,17 +14,13 @@ from gestured.client.program import Parser, program, run
 from gestured.client.say import say
 from gestured.client.values import number
 from gestured.core.errors import GesturedError
-from gestured.core.listening import Arming
-from gestured.core.points import STRICTNESS, USUAL
-from gestured.lab.everyday import FIRST as FIRST_DAY
-from gestured.lab.made_of import command_of
-from gestured.lab.recordings.flags import LARGEST_SEED, add_recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
 KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that go on where they were interrupted
+INTERRUPTED = 130  # the exit status after Ctrl-C, as a shell has it
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",
@@ -41,6 +37,11 @@ PROGRAMS = {
 
 def parser() -> Parser:
     """The command line; every subcommand's help has an example."""
+    from gestured.core.listening import Arming
+    from gestured.core.points import STRICTNESS, USUAL
+    from gestured.lab.everyday import FIRST as FIRST_DAY
+    from gestured.lab.recordings.flags import LARGEST_SEED, add_recordings
+
     top, commands = program(
         "gestured-lab", "COMMAND", "Train and evaluate gestured's models.",
         "example: gestured-lab train --out models",
@@ -144,9 +145,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that has not all letters shows question marks
     given = sys.argv[1:] if arguments is None else arguments
-    top = parser()
-    top.set_defaults(words=command_of(["gestured-lab", *given]))
-    return run(top, given)
+    try:
+        from gestured.lab.made_of import command_of
+
+        top = parser()
+        top.set_defaults(words=command_of(["gestured-lab", *given]))
+        return run(top, given)
+    except KeyboardInterrupt:  # while its modules were imported: nothing has been done
+        return INTERRUPTED
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -161,7 +167,7 @@ def _run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         kept = "; what is finished is kept" if args.command in KEEPS else ""
         say("", f"gestured-lab: interrupted{kept}", to=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def _program(command: str) -> ModuleType:

@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-from typing import NoReturn
 
 import pytest
 
@@ -58,14 +57,6 @@ def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: 
     status, out, err = run(*command.split(), flag, value)
     assert (status, out) == (2, "")
     assert f"argument {flag}: " in err and value in err
-
-
-def test_ctrl_c_before_it_has_begun_leaves_no_traceback(run, monkeypatch) -> None:
-    def imported(name: str) -> NoReturn:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("gestured.control.cli.import_module", imported)
-    assert run("enrol", "knock", "--sensor", "arm") == (1, "", "")
 
 
 def redirected(where: str, *arguments: str) -> tuple[int, str]:
