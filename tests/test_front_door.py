@@ -1,8 +1,11 @@
 """What `import gestured` offers: cheap until it is used, and clear about mistakes; and how its programs begin."""
 
+import copy
 import json
+import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -86,6 +89,8 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"grid": 9}, "found 9"),
         ({"grid": (9, 9.5)}, r"found \(9, 9\.5\)"),
         ({"rotate": 45}, "found 45"),
+        ({"rotate": 90.0}, "rotate: expected 0, 90, 180 or 270, found 90.0"),
+        ({"rotate": np.array([90, 180])}, "rotate: expected 0, 90, 180 or 270, found array"),
         ({"mirror": "no"}, "mirror: expected true or false, found 'no'"),
         ({"invert": float("nan")}, "invert: expected true or false, found nan"),
         ({"touch": "yes"}, "touch: expected true or false, found 'yes'"),
@@ -97,8 +102,10 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"tap_gap_s": "0.4"}, "tap_gap_s: expected a number of seconds, found '0.4'"),
         ({"arming": {"by": "one_tap", "seconds": "5"}}, "arming.seconds: expected a number of seconds, found '5'"),
         ({"zones": False}, "zones: expected four numbers for each name, found False"),
+        ({"zones": {5: (0, 0, 1, 1)}}, "zones: expected a text as the name of each, found 5"),
+        ({"zones": {("a",): (0, 0, 1, 1)}}, r"zones: expected a text as the name of each, found \('a',\)"),
         ({"thresholds": {"one_tap": True}}, "thresholds: one_tap: expected 0 to 1, found True"),
-        ({"thresholds": {"wave": 0.5}}, "'wave' is no gesture of cnn_lstm, expected any of .*one_tap"),
+        ({"thresholds": {"wave": 0.5}}, "thresholds: 'wave' is no gesture of cnn_lstm, expected any of .*one_tap"),
         ({"thresholds": {"one_tap": 5}}, "thresholds: one_tap: expected 0 to 1, found 5"),
         ({"thresholds": 0.5}, "thresholds: expected a confidence for each name, .*found 0.5"),
         ({"strictness": "lax"}, "strictness: expected eager or normal or strict, found 'lax'"),
@@ -134,6 +141,17 @@ def test_a_mistake_in_pushing_is_one_sentence_and_loses_nothing(recognizer: Any,
     with pytest.raises(ValueError, match=words):
         recognizer.push(t, values)
     assert recognizer.push(1.1, np.zeros((9, 9), np.uint16)) == []
+
+
+@pytest.mark.parametrize("take", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_recogniser_is_neither_copied_nor_pickled(recognizer: Any, take: Callable[[Any], Any]):
+    with pytest.raises(TypeError, match=r"gestured\.open"):
+        take(recognizer)
+
+
+def test_a_threshold_is_any_real_number(shelf: Path):
+    sure: Any = np.float32(0.5)
+    gestured.open("cnn_lstm", thresholds={"one_tap": sure})
 
 
 def test_numbers_of_any_kind_are_times(shelf: Path):

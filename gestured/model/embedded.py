@@ -6,8 +6,9 @@ import math
 import operator
 import os
 from collections.abc import Collection, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import Any, NoReturn, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +41,7 @@ from gestured.model.own_file import OwnFileError
 # What `open` takes, where nothing further on says it better.
 _TAKES: Mapping[str, tuple[Any, str]] = {
     "model": (str | os.PathLike, "a name or a path"), "own_gestures": (str | os.PathLike | None, "a path"),
+    "rotate": (int | np.integer, "0, 90, 180 or 270"),
     "gestures": (Collection | None, "a list of names"), "zones": (Mapping | None, "four numbers for each name"),
     "thresholds": (Mapping | None, "a confidence for each name, such as {'one_tap': 0.8}"),
     **dict.fromkeys(("tap_gap_s", "arming.seconds"), (SupportsFloat, "a number of seconds")),
@@ -60,6 +62,10 @@ class Embedded:
         self._shape = sensor.front_end.grid_sent
         self._last = -math.inf  # s, the time of the last frame
         self._closed: set[str] = set()  # gates
+
+    def __reduce_ex__(self, _: object) -> NoReturn:
+        """Copies would share what is known of the sensor, and a model is of one process."""
+        raise TypeError("a recogniser cannot be copied or pickled: use gestured.open where another one is needed")
 
     def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
         """Take the frame of `t` s, (R, C) counts as the sensor sends them; give what it decides.
@@ -171,6 +177,9 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             raise SettingsError(f"{name}: expected {words}, found {given[name]!r}")
     if not isinstance(sensor, str) or not is_sensor(sensor):
         raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
+    for name in zones or ():
+        if not isinstance(name, str):
+            raise SettingsError(f"zones: expected a text as the name of each, found {name!r}")
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
     used = gestures_in_use(ladder, gestures)
     if own_gestures is not None:
@@ -216,11 +225,11 @@ def _own(ladder: Ladder, path: Path) -> Own:
 
 def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:
     """Confidences by name, of the model's gestures and the user's own."""
-    require_gestures(ladder, (name for name in told if name not in ladder.own.gestures))
+    require_gestures(ladder, (name for name in told if name not in ladder.own.gestures), "thresholds")
     for name, least in told.items():
-        if isinstance(least, bool) or not isinstance(least, int | float) or not 0 <= least <= 1:
+        if isinstance(least, bool) or not isinstance(least, Real) or not 0 <= least <= 1:
             raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")
-    return told
+    return {name: float(least) for name, least in told.items()}
 
 
 def _seconds(t: Any) -> float:
