@@ -20,7 +20,7 @@ DIE = "import ctypes; ctypes.CDLL(None).prctl(1, 15); " if sys.platform == "linu
 def child_of_ours(module: str) -> list[str]:
     """The beginning of a command line that runs a module of gestured's, and ends when we do, however we end."""
     root = Path(gestured.__file__).parent.parent
-    safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
+    safe = [] if root.samefile(".") else ["-P"]  # a folder named gestured in the current one is not the package
     run = f"{DIE}import runpy; runpy.run_module('{module}', run_name='__main__', alter_sys=True)"
     return [sys.executable, *safe, "-c", run]
 

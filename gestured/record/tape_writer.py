@@ -32,6 +32,7 @@ class Writer:
         self._senders: dict[str, int] = {}
         self._waiting = 0  # bytes that are not in the file yet
         self._broken = False  # the file took no more
+        self._good = ""  # what to say of the file then
         try:
             with self._writing():
                 self._mcap.start(profile="gestured", library="gestured")
@@ -66,7 +67,7 @@ class Writer:
         with self._writing():
             self._mcap.flush()
             os.fsync(self._file.fileno())
-        self._waiting = 0
+        self._waiting, self._good = 0, "; good up to there"
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -74,7 +75,7 @@ class Writer:
             yield
         except OSError as error:
             self._broken = True
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}; good up to there") from error
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}{self._good}") from error
 
     def _add(self, channel: int, t_ns: int, data: bytes) -> None:
         with self._writing():  # a chunk that is full is written now

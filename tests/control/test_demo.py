@@ -58,6 +58,15 @@ def ended(process: "subprocess.Popen[bytes]") -> tuple[int, str, str]:
     return process.returncode, out.decode(), err.decode()
 
 
+def test_its_daemon_starts_from_a_folder_that_has_been_removed(tmp_path: Path, monkeypatch):
+    (folder := tmp_path / "gone").mkdir()
+    with monkeypatch.context() as here:
+        here.chdir(folder)
+        folder.rmdir()
+        with Engine("cnn_lstm", 9, 9) as engine:
+            assert engine.ready["model"] == "cnn_lstm"
+
+
 def test_outcomes_add_up_to_the_summary(start, shallow):
     kinds = ("--kinds", "swipe_left,one_tap", "--speed", "normal")
     status, out, err = ended(start("demo", "--seconds", 7, *kinds, "--json", env={"TMPDIR": str(shallow)}))
