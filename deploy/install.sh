@@ -44,8 +44,10 @@ pip() {  # pip ARGUMENT...: install with the pip of VENV
     }
 }
 
+touch "$work/before"
+if [ -e "$root$lib/installed" ]; then cp "$root$lib/installed" "$work/before"; fi
 rm -rf "$new" "$old"
-mkdir -p "$(dirname "$new")"
+mkdir -p "$new"  # said now where it may not be made, and not after minutes
 if [ -n "${WHEELS-}" ]; then
     # shellcheck disable=SC2046,SC2086 # one argument for each wheel; a name of a wheel has no blanks
     pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM $(echo "$WHEELS"/*.whl)
@@ -96,6 +98,9 @@ for file in *.md docs/*.md; do
 done
 keep deploy/gestured.toml /etc/gestured/gestured.toml
 keep systemd/gestured.default /etc/default/gestured
+grep -vxFf "$work/installed" "$work/before" | while read -r file; do
+    rm -f "$root$file"  # of an older version, which this one has no more
+done
 mv "$work/installed" "$root$lib/installed"  # what `make uninstall` removes, beside the packages
 cat <<END
 installed${root:+ below $root}:
