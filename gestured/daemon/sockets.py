@@ -75,9 +75,12 @@ def bind_tcp(address: Address) -> socket.socket:
 
 
 def name_of(sock: socket.socket) -> str:
-    """HOST:PORT that an IP socket is bound to, or the path of a Unix socket."""
+    """HOST:PORT that an IP socket is bound to, a link-local host with its interface; or the path of a Unix socket."""
     where = sock.getsockname()
-    return str(where if sock.family == socket.AF_UNIX else Address(*where[:2]))
+    if sock.family == socket.AF_UNIX:
+        return str(where)
+    scope = where[3] if sock.family == socket.AF_INET6 else 0
+    return str(Address(f"{where[0]}%{socket.if_indextoname(scope)}" if scope else where[0], where[1]))
 
 
 class Listener:

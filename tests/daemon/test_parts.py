@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -22,7 +24,7 @@ from gestured.daemon import http, log
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load_settings
 from gestured.daemon.service import Service
-from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp
+from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp, name_of
 from gestured.daemon.status import healthy, overall, status
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
@@ -78,6 +80,13 @@ def test_the_allow_list_knows_mapped_and_scoped_addresses() -> None:
 @pytest.fixture
 def parts(model: Path) -> Parts:
     return Parts(model)
+
+
+def test_a_link_local_address_is_told_with_its_interface() -> None:
+    bound: Any = SimpleNamespace(family=socket.AF_INET6, getsockname=lambda: ("fe80::1", 9000, 0, 1))
+    address = name_of(bound)
+    assert address == f"[fe80::1%{socket.if_indextoname(1)}]:9000"
+    assert str(Address.parse(address)) == address
 
 
 def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(parts: Parts, monkeypatch, capfd) -> None:

@@ -42,7 +42,7 @@ def run(tmp_path: Path) -> Install:
     programs = tmp_path / "venv" / "bin"
     programs.mkdir(parents=True)
     (programs / "python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
-    (programs / "pip").write_text('#!/bin/sh\nfor last; do [ "$before" != --target ] || mkdir -p "$last"; before=$last; done\n')
+    (programs / "pip").write_text("#!/bin/sh\n")
     for program in programs.iterdir():
         program.chmod(0o755)
 
