@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,16 +31,26 @@ class Engine:
 
     def __init__(self, model: str, rows: int, columns: int, *more: str) -> None:
         """Start the daemon with a grid of rows x columns; `more` are further flags of its command line."""
-        self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
-        folder = Path(self._folder.name)
-        self._log = folder / "log"
+        try:
+            self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
+            self._process = self._start(Path(self._folder.name), model, f"{rows}x{columns}", more)
+        except OSError as error:
+            raise GesturedError(f"the daemon did not start: {error.strerror}") from error
+        try:
+            self.ready = self._wait()
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, folder: Path, model: str, grid: str, more: Sequence[str]) -> "subprocess.Popen[bytes]":
         command = [*child_of_ours("gestured.daemon"), "--model", model, "--listen", "127.0.0.1:0"]
-        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
+        command += ["--socket", str(folder / "events.sock"), "--grid", grid]
         command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # the user's would change answers
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
+        self._log = folder / "log"
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C is for us, and we end it in our own time.
-            self._process = subprocess.Popen(
+            return subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -47,11 +58,6 @@ class Engine:
                 env=environment,
                 start_new_session=True,
             )
-        try:
-            self.ready = self._wait()
-        except BaseException:
-            self.close()
-            raise
 
     def _wait(self) -> dict[str, Any]:
         assert self._process.stdout is not None

@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 from contextlib import closing
@@ -65,6 +66,13 @@ def test_its_daemon_starts_from_a_folder_that_has_been_removed(tmp_path: Path, m
         folder.rmdir()
         with Engine("cnn_lstm", 9, 9) as engine:
             assert engine.ready["model"] == "cnn_lstm"
+
+
+def test_without_a_folder_for_temporary_files_it_ends_with_a_sentence(monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: ["/proc"])  # nobody can make a file there
+    with pytest.raises(gestured.GesturedError, match=r"^the daemon did not start: No usable temporary directory found"):
+        Engine("cnn_lstm", 9, 9)
 
 
 def test_outcomes_add_up_to_the_summary(start, shallow):
