@@ -85,7 +85,7 @@ class Zenoh:
         while not self._closed.is_set():
             try:
                 session = zenoh.open(self._config)
-            except zenoh.ZError as error:
+            except BaseException as error:  # noqa: BLE001 - a panic, as without descriptors, is no `Exception`
                 words = f"Zenoh cannot be reached: {_first_words(error)}; trying again"
                 self._counts.connected("zenoh", False, words)
                 self._closed.wait(pause)

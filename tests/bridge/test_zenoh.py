@@ -309,6 +309,23 @@ def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
     assert pauses[0] < 0.5 and pauses[-2:] == [2.0, 2.0]
 
 
+def test_after_a_panic_of_zenohs_it_is_tried_again(monkeypatch, capfd):
+    """As for want of descriptors or threads: the bridge would live on, and never reach a router."""
+
+    class Panic(BaseException):
+        """What Rust's panics are in Python."""
+
+    def opened(_: object) -> None:
+        raise Panic("Failed to init net")
+
+    session = unconnected()
+    pauses: list[float] = []
+    monkeypatch.setattr(zenoh, "open", opened)
+    monkeypatch.setattr(session, "_closed", SimpleNamespace(is_set=lambda: bool(pauses), wait=pauses.append))
+    session._open()
+    assert pauses and "Failed to init net; trying again" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
