@@ -81,7 +81,9 @@ def examine(path: Path) -> Iterator[Finding]:
             yield _elsewhere(path, others)
             return
         remedy = "does it run? systemctl status gestured; its last words: journalctl --unit gestured --lines 20"
-        if isinstance(error, Stranger):
+        if path in others and not path.exists():
+            remedy = f"one runs whose sockets in {path.parent} somebody has removed: end it, and start it again"
+        elif isinstance(error, Stranger):
             remedy = f"ls -ld {path.parent} shows whose folder it is"
         yield Finding("bad", str(error), remedy)
         yield _port(Address("127.0.0.1", 9000))

@@ -145,6 +145,14 @@ def test_doctor_without_any_daemon_asks_whether_it_runs(run, tmp_path: Path, mon
     assert status == 1 and "no daemon on" in out and "does it run? systemctl status gestured" in out
 
 
+def test_doctor_finds_a_daemon_whose_sockets_were_removed(run, serve) -> None:
+    control = Path(serve().ready["control"])  # as a session that ends removes its folder, and a cleaner what is old
+    control.unlink()
+    findings = map(json.loads, run("doctor", "--control", control, "--json")[1].splitlines())
+    (found,) = [found for found in findings if str(control) in found["what"]]
+    assert found["level"] == "bad" and "start it again" in found["remedy"] and str(control.parent) in found["remedy"]
+
+
 def test_doctor_names_a_daemon_that_runs_with_another_socket(ctl, run, daemon: Daemon, tmp_path: Path) -> None:
     status, out, _ = run("doctor", "--control", tmp_path / "none.ctl", "--json")
     said = [found for found in map(json.loads, out.splitlines()) if found["level"] != "ok"]
