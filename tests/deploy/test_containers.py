@@ -31,6 +31,16 @@ def test_the_programs_in_the_image_are_called_as_they_can_be():
     assert f"http://{address}/healthz" in code
 
 
+def test_sockets_and_own_gestures_have_folders_that_the_daemon_may_write_to_and_that_are_volumes():
+    yaml = pytest.importorskip("yaml")
+    daemon = yaml.safe_load((ROOT / "deploy" / "compose.yaml").read_text())["services"]["gestured"]
+    mounted = [volume.split(":")[1] for volume in daemon["volumes"]]
+    for variable in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
+        (folder,) = re.findall(rf"{variable}=(\S+)", DOCKERFILE)
+        assert folder in mounted
+        assert re.search(rf"install --directory --owner=gestured [^&\n]*{folder}\b", DOCKERFILE)
+
+
 def test_every_service_is_closed_in_and_every_mount_is_there():
     yaml = pytest.importorskip("yaml")
     found = yaml.safe_load((ROOT / "deploy" / "compose.yaml").read_text())
