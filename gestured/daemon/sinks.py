@@ -15,7 +15,7 @@ from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import reason_of
 
-LOOK_UP_S = 5.0  # from one look-up of a destination that was not found to the next
+LOOK_UP_S = 5.0  # from one look-up of a destination that was not found or not reached to the next
 
 
 class Sink(Protocol):
@@ -52,11 +52,17 @@ class UdpOut(Sink):
         """Find the destination, which may block for seconds; any thread may."""
         try:
             family, self._where = look_up(self.destination, socket.SOCK_DGRAM)
-            self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+            if self._socket is None or self._socket.family != family:
+                self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         except OSError as error:
             reason = error.strerror or reason_of(error)
             self._throttle.warn("publish: no such destination", reason, destination=str(self.destination))
         self._due = time.monotonic() + LOOK_UP_S
+
+    def _look_again_soon(self) -> None:
+        if time.monotonic() >= self._due:
+            self._due = math.inf
+            threading.Thread(target=self._look_again, name="publish", daemon=True).start()
 
     def _look_again(self) -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
@@ -74,9 +80,7 @@ class UdpOut(Sink):
         """Send a packet, or count that it could not be sent."""
         if self._socket is None:
             self._failed("unresolved")
-            if time.monotonic() >= self._due:  # the network, or who knows names in it, comes later than we do
-                self._due = math.inf
-                threading.Thread(target=self._look_again, name="publish", daemon=True).start()
+            self._look_again_soon()  # the network, or who knows names in it, comes later than we do
             return
         for _ in range(2):
             try:
@@ -92,8 +96,9 @@ class UdpOut(Sink):
                 self._failed("full")
                 return
             except OSError:
-                self._connected = False  # our own address may have changed with the network
+                self._connected = False  # our own address may have changed with the network, or the destination's
                 self._failed("unreachable")
+                self._look_again_soon()
                 return
 
     def _failed(self, result: str) -> None:

@@ -14,13 +14,18 @@ from gestured.daemon import sinks
 from gestured.daemon.metrics import Metrics
 from tests.daemon.harness import DEADLINE_S
 
+NOT_KNOWN = socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+# The broadcast address is refused by our own kernel at once: no packet leaves this machine.
+ELSEWHERE = socket.AF_INET, ("255.255.255.255", 9)
 
-def test_a_destination_whose_name_is_not_known_yet_is_looked_up_again(
-    udp: socket.socket, monkeypatch: pytest.MonkeyPatch
+
+@pytest.mark.parametrize(("before", "result"), [(NOT_KNOWN, "unresolved"), (ELSEWHERE, "unreachable")])
+def test_a_destination_whose_name_is_not_known_yet_or_was_of_another_host_is_looked_up_again(
+    udp: socket.socket, monkeypatch: pytest.MonkeyPatch, before: Any, result: str
 ) -> None:
-    """As at the start of a machine, whose network comes later than we do."""
+    """As at the start of a machine, whose network comes later than we do, and where a host gets another address."""
     known = look_up(Address(*udp.getsockname()), socket.SOCK_DGRAM)
-    found: list[Any] = [socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")] * 2 + [known]
+    found: list[Any] = [before] * 2
 
     def later(*_: object) -> Any:
         if isinstance(one := found.pop(0) if found else known, OSError):
@@ -34,7 +39,7 @@ def test_a_destination_whose_name_is_not_known_yet_is_looked_up_again(
     end = time.monotonic() + DEADLINE_S
     while ("sent",) not in metrics.sent.values and time.monotonic() < end:
         sink.publish(Status("ok", {}, "tiny", 0.0), 0.0)
-    assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values["unresolved",] > 0
+    assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values[result,] > 0
     sink.close()
 
 
