@@ -5,7 +5,7 @@ import signal
 import socket
 import threading
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 from gestured.client.address import look_up
 from gestured.core.address import Address
@@ -33,7 +33,7 @@ class UdpOut(Sink):
     """A sink that the configuration names, at one UDP address: it never blocks, and counts what it cannot deliver.
 
     A reload replaces it. The socket is connected, so that a port where nobody listens is told to us (by the next
-    call). A destination that cannot be reached costs a failed system call a packet, nothing more.
+    call). A destination that cannot be reached costs some failed system calls a packet, nothing more.
     """
 
     wants: frozenset[str] = frozenset()  # types of events that are made only where somebody wants them
@@ -44,25 +44,18 @@ class UdpOut(Sink):
         self._out = osc_out
         self.destination = destination
         self._metrics, self._throttle = metrics, Throttle()
+        self._found: tuple[int, Any] | None = None  # family and address, where no socket is connected to them yet
         self._socket: socket.socket | None = None
-        self._connected = False
         self._look_up()
 
     def _look_up(self) -> None:
         """Find the destination, which may block for seconds; any thread may."""
         try:
-            family, self._where = look_up(self.destination, socket.SOCK_DGRAM)
-            if self._socket is None or self._socket.family != family:
-                self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+            self._found = look_up(self.destination, socket.SOCK_DGRAM)
         except OSError as error:
             reason = error.strerror or reason_of(error)
             self._throttle.warn("publish: no such destination", reason, destination=str(self.destination))
         self._due = time.monotonic() + LOOK_UP_S
-
-    def _look_again_soon(self) -> None:
-        if time.monotonic() >= self._due:
-            self._due = math.inf
-            threading.Thread(target=self._look_again, name="publish", daemon=True).start()
 
     def _look_again(self) -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
@@ -78,15 +71,13 @@ class UdpOut(Sink):
 
     def send(self, packet: bytes) -> None:
         """Send a packet, or count that it could not be sent."""
-        if self._socket is None:
-            self._failed("unresolved")
-            self._look_again_soon()  # the network, or who knows names in it, comes later than we do
-            return
         for _ in range(2):
             try:
-                if not self._connected:
-                    self._socket.connect(self._where)
-                    self._connected = True
+                if self._found is not None:
+                    self._connect(*self._found)
+                if self._socket is None:
+                    self._lost("unresolved")  # the network, or who knows names in it, comes later than we do
+                    return
                 self._socket.send(packet)
                 self._metrics.sent.add("sent")
                 return
@@ -96,10 +87,23 @@ class UdpOut(Sink):
                 self._failed("full")
                 return
             except OSError:
-                self._connected = False  # our own address may have changed with the network, or the destination's
-                self._failed("unreachable")
-                self._look_again_soon()
+                self._lost("unreachable")  # the network may have changed, and with it its address or ours
                 return
+
+    def _connect(self, family: int, where: Any) -> None:
+        """A new socket, since one that was connected keeps our own address of then, even if it is connected again."""
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        self._socket.connect(where)
+        self._found = None
+
+    def _lost(self, result: str) -> None:
+        """Count a packet that cannot be sent, and look the destination up again, every LOOK_UP_S at the most."""
+        self._failed(result)
+        if time.monotonic() >= self._due:
+            self._due = math.inf
+            threading.Thread(target=self._look_again, name="publish", daemon=True).start()
 
     def _failed(self, result: str) -> None:
         self._metrics.sent.add(result)

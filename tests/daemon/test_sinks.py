@@ -1,5 +1,6 @@
 """Destinations that the settings name, where they cannot be reached at once."""
 
+import errno
 import socket
 import time
 from typing import Any
@@ -40,6 +41,33 @@ def test_a_destination_whose_name_is_not_known_yet_or_was_of_another_host_is_loo
     while ("sent",) not in metrics.sent.values and time.monotonic() < end:
         sink.publish(Status("ok", {}, "tiny", 0.0), 0.0)
     assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values[result,] > 0
+    sink.close()
+
+
+def test_after_this_machine_got_another_address_a_new_socket_is_taken(
+    udp: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is connected keeps the address of then, and connecting it again does not help."""
+    made: list[socket.socket] = []
+
+    class Kept(socket.socket):
+        def __init__(self, *which: Any) -> None:
+            super().__init__(*which)
+            made.append(self)
+
+        def send(self, *data: Any) -> int:
+            if self is made[0]:
+                raise OSError(errno.ENETUNREACH, "Network is unreachable")
+            return super().send(*data)
+
+    monkeypatch.setattr(socket, "socket", Kept)
+    monkeypatch.setattr(sinks, "LOOK_UP_S", 0.0)
+    metrics = Metrics()
+    sink = sinks.OscSink(Address(*udp.getsockname()), metrics)
+    end = time.monotonic() + DEADLINE_S
+    while ("sent",) not in metrics.sent.values and time.monotonic() < end:
+        sink.publish(Status("ok", {}, "tiny", 0.0), 0.0)
+    assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values["unreachable",] > 0
     sink.close()
 
 
