@@ -15,7 +15,7 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.client.sensor import connected, sent_after_refusal
 from gestured.core.address import Address, is_sensor
-from gestured.core.errors import ProtocolError
+from gestured.core.errors import GesturedError, ProtocolError
 from gestured.core.osc import decode
 
 MOST_SENDERS = 512  # sensors from Zenoh, each with a socket of its own: the daemon shares its work out by sources
@@ -105,7 +105,10 @@ class Forward:
 
     def _forward(self, name: str, payload: Any) -> str:
         """Send a packet on; returns what became of it."""
-        sender = self._sender(name)
+        try:
+            sender = self._sender(name)
+        except GesturedError:  # the network is down
+            return "unheard"
         if sender is None:
             return "overflow"
         if sender.floods(self._clock()):

@@ -1,5 +1,7 @@
 """A simulated sensor's firmware: frames and finger positions as OSC packets, sent at their times over UDP."""
 
+import errno
+import os
 import socket
 import struct
 import threading
@@ -73,13 +75,21 @@ def connected(to: tuple[str, int]) -> socket.socket:
 def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
     """Send on a connected UDP socket; whether a closed port has refused an earlier packet.
 
-    The system says so instead of sending, once for each refusal.
+    The system says so instead of sending, once for each refusal. A socket that was connected also keeps this machine's
+    address of then: where that is gone, a new one takes its place. Raises OSError where a packet cannot be sent.
     """
     try:
         sock.send(packet)
     except ConnectionRefusedError:
         sock.send(packet)
         return True
+    except OSError as error:
+        if error.errno != errno.ENETUNREACH:
+            raise
+        with socket.socket(sock.family, socket.SOCK_DGRAM) as made:
+            made.connect(sock.getpeername())
+            os.dup2(made.fileno(), sock.fileno(), inheritable=False)
+        sock.send(packet)
     return False
 
 
@@ -96,12 +106,16 @@ class Sensor:
         self.begun, self.stop = threading.Event(), threading.Event()
 
     def send(self, frames: Iterable[tuple[int, Frame]]) -> None:
-        """Send (counter, frame) until they end or `stop` is set. A late frame goes out at once."""
+        """Send (counter, frame) until they end or `stop` is set; a late frame at once. Raises GesturedError."""
         for counter, frame in frames:
             wait = self.start + frame.t - time.monotonic()
             if self.stop.wait(max(wait, 0.0)):
                 return
-            self.unheard += sent_after_refusal(self.socket, self.form.packet(frame, counter, self.moment(frame.t)))
+            packet = self.form.packet(frame, counter, self.moment(frame.t))
+            try:
+                self.unheard += sent_after_refusal(self.socket, packet)
+            except OSError as error:
+                raise GesturedError(f"cannot send to {self.to}: {error.strerror}") from error
             self.sent += 1
             self.begun.set()
 

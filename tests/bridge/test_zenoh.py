@@ -229,6 +229,9 @@ def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
     assert [became(name) for name in ("a", "c")] == ["sent", "overflow"]
     now += 2.0
     assert [became(name) for name in ("c", "a", "b")] == ["sent", "sent", "overflow"]
+    now += forward.SILENT_S + 1.0
+    frames._to = Address("255.255.255.255", 9)  # as a network that is down, our own kernel refuses it
+    assert became("d") == "unheard"
 
 
 def test_a_router_that_says_nothing_holds_up_no_end(bridge, fake, tmp_path):

@@ -1,17 +1,22 @@
 """gesturectl simulate, received on a real UDP socket and read with python-osc."""
 
+import errno
 import json
 import re
 import signal
 import socket
 import time
+from contextlib import closing
+from typing import Any
 
 import numpy as np
 import pytest
 from pythonosc.osc_bundle import OscBundle
 
-from gestured.client.sensor import Sensor
+from gestured.client.sensor import Form, Sensor, connected, sent_after_refusal
 from gestured.control.play import takes
+from gestured.core.errors import GesturedError
+from gestured.core.frames import Frame
 from gestured.simulator import GESTURES
 from gestured.simulator.places import PLACES
 from gestured.simulator.resting import POSTURES
@@ -173,3 +178,32 @@ def test_a_day_has_kinds_of_its_own(run):
     status, out, err = run("simulate", "--everyday", "--kinds", "one_tap")
     assert (status, out) == (1, "")
     assert "--everyday: expected neither --kinds nor --speed" in err
+
+
+def out_of_reach(port: int) -> type[socket.socket]:
+    """A socket that cannot send from this port, as one that keeps an address which this machine has no more."""
+
+    class Kept(socket.socket):
+        def send(self, *data: Any) -> int:
+            if self.getsockname()[1] == port:
+                raise OSError(errno.ENETUNREACH, "Network is unreachable")
+            return super().send(*data)
+
+    return Kept
+
+
+def test_after_this_machine_got_another_address_a_new_socket_takes_the_place_of_the_old(udp):
+    with connected(udp.getsockname()) as old:
+        kept = out_of_reach(old.getsockname()[1])(fileno=old.detach())
+    with kept:
+        assert not sent_after_refusal(kept, b"a frame")
+        assert udp.recv(9) == b"a frame"
+
+
+def test_a_network_that_goes_is_a_sentence(udp, monkeypatch):
+    sensor = Sensor(udp.getsockname(), Form("a"))
+    monkeypatch.setattr(
+        "gestured.client.sensor.sent_after_refusal", lambda *_: sensor.socket.connect(("255.255.255.255", 9))
+    )
+    with closing(sensor), pytest.raises(GesturedError, match=r"^cannot send to 127\.0\.0\.1:\d+: "):
+        sensor.send([(0, Frame(0.0, np.zeros((9, 9))))])

@@ -57,9 +57,9 @@ class Pad:
         while not stop.is_set():
             try:
                 self._sender.send(frames)
-            except OSError as error:
+            except GesturedError as error:
                 if not stop.is_set():
-                    self._tell("gone", {"reason": f"cannot send to {self.to}: {error.strerror or error}"})
+                    self._tell("gone", {"reason": str(error)})
                 stop.wait(AGAIN_S)
 
     def _hear(self, events: Subscriber) -> None:
