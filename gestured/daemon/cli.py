@@ -77,6 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: sys.exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    # Whoever starts us may have blocked them, and a child has its starter's mask.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGHUP})
     given: dict[str, Any] = vars(parser().parse_args(arguments))
     explain = given.pop("explain")
     from gestured.daemon import log

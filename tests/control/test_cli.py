@@ -92,13 +92,16 @@ def test_an_error_that_cannot_be_said_changes_no_exit_status() -> None:
 
 
 @pytest.mark.parametrize("handle", [stop_as_by_ctrl_c, lambda: on_stop(print)])
-def test_what_nohup_started_outlives_its_terminal(handle) -> None:
+def test_what_nohup_started_outlives_its_terminal_and_a_blocked_stop_is_heard(handle) -> None:
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup leaves it
         handle()
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         assert signal.getsignal(signal.SIGTERM) is not before[signal.SIGTERM]
+        assert signal.SIGTERM not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
     finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -128,6 +128,19 @@ def test_systemd_is_told(start, tmp_path: Path) -> None:
         assert daemon.wait() == 0
 
 
+def test_signals_that_its_starter_had_blocked_reach_it(start) -> None:
+    """A child has the mask of the thread that starts it, which some supervisors forget."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGHUP})
+    try:
+        daemon = start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    daemon.signal(signal.SIGHUP)
+    while not daemon.ask("status")["reloads"]:
+        pass
+    assert daemon.stop() == 0
+
+
 def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s", python=["-v"])
     with daemon.stderr_path.open() as log:
