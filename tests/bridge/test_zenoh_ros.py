@@ -1,6 +1,7 @@
 """Events as topics of ROS 2, heard through a real router by another implementation of rmw_zenoh's protocol: pyzeros."""
 
 import argparse
+import asyncio
 import json
 import queue
 import socket
@@ -49,6 +50,16 @@ class Listener:
         """The next message's topic, and the event in it."""
         topic, sample = self.samples.get(timeout=DEADLINE_S)
         return topic, json.loads(String.deserialize(sample.payload.to_bytes()).data)
+
+
+@pytest.fixture(autouse=True)
+def loop() -> Iterator[None]:
+    """A loop of asyncio, which its subscriptions belong to, though they call us from Zenoh's threads."""
+    loop = asyncio.new_event_loop()
+    asyncio.set_event_loop(loop)
+    yield
+    asyncio.set_event_loop(None)
+    loop.close()
 
 
 def begin(bridge: Any, site: Site, daemon: Any, *more: object, domain: str = "") -> Any:
