@@ -33,7 +33,7 @@ ONLY_IN = {
     "pythonosc": {"gestured/client/osc_out.py"},
     "prometheus_client": {"gestured/daemon/exposition.py", "gestured/bridge/counts.py"},
     "paho": {"gestured/bridge/broker.py"},
-    "zenoh": {"gestured/bridge/zenoh_session.py"},
+    "zenoh": {"gestured/bridge/zenoh_session.py", "gestured/bridge/zenoh_ros.py"},
     "serial": {"gestured/bridge/serial.py"},
 }
 

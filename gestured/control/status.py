@@ -134,7 +134,7 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
         f"subscribers: {out['subscribers']}, {out['backlog_bytes']} bytes waiting, {out['lines_lost']} lines lost, "
         f"{sum(out['evicted'].values())} cut off"
     )
-    yield f"loop: {1000 * status['loop_lag_s']:.0f} ms late, {status['internal_errors']} bugs caught"
+    yield f"late: {1000 * status['loop_lag_s']:.0f} ms; {status['internal_errors']} bugs caught"
     yield f"shift: {_shift(status['shift'])}"
     yield from (f"own gestures: {said}" for said in own_faults(status))
 

@@ -35,7 +35,11 @@ _OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Status], float]], ...] = (
     ("gestured_clients", "Clients of the event socket", lambda s: s["output"]["subscribers"]),
     ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s["output"]["backlog_bytes"]),
     ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s["input"]["kernel_drops"]),
-    ("gestured_loop_lag_seconds", "How late the event loop is", lambda s: s["loop_lag_s"]),
+    (
+        "gestured_loop_lag_seconds",
+        "How late the loop is, or the packets that it reads",
+        lambda s: s["loop_lag_s"],
+    ),
     ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s["model"]["rung"]),
     ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s["model"]["failures"]),
     ("gestured_start_time_seconds", "When the daemon started", lambda s: s["started"]),

@@ -74,6 +74,11 @@ class Parts:
         """Until when packets were served as of now, in monotonic s: a sensor whose packets wait is not silent."""
         return time.monotonic() - self.receiver.behind_s
 
+    @property
+    def late_s(self) -> float:
+        """How late the daemon is, in s: its loop, or the packets that it reads, where more come than it can serve."""
+        return max(self.pulse.lag_s, self.receiver.behind_s)
+
     def readings(self) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the configuration."""
         return self.hub.readings(self.served)

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from gestured.control.findings import examine_status
 from gestured.core.address import Address
 from gestured.core.events import Gate
 from gestured.core.hub import REMEMBERED
@@ -168,6 +169,18 @@ def test_health_and_readiness_say_what_is_wrong(model: Path, tmp_path: Path) -> 
         assert not healthy(parts)["healthy"] and healthy(parts)["loop_age_s"] >= 10
         told = "the event loop hangs; the daemon is stopping; no model could classify the last segment"
         assert status(parts)["ready"]["reason"] == told and status(parts)["loop_lag_s"] >= 9
+
+    with_service(model, tmp_path, look)
+
+
+def test_an_overload_is_told_by_how_late_packets_are_read(model: Path, tmp_path: Path) -> None:
+    """Its loop turns in time meanwhile, and for some seconds nothing is dropped."""
+
+    async def look(service: Service) -> None:
+        service.parts.receiver.behind_s = 3.0
+        found = status(service.parts)
+        assert found["loop_lag_s"] == 3.0 and healthy(service.parts)["healthy"]
+        assert any("3000 ms late" in finding.what for finding in examine_status(found))
 
     with_service(model, tmp_path, look)
 
