@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally, owners, whose
+from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally, owners, tallied, whose
 
 
 def said(name: str, onset: float, offset: float) -> dict[str, object]:
@@ -52,7 +52,9 @@ def test_of_two_neighbours_the_one_that_overlaps_more():
     assert tally.hear(said("swipe_up", 10.35, 11.0), 11.2).performed is second
 
 
-spans = st.tuples(st.floats(0, 60), st.floats(0, 3)).map(lambda span: (span[0], span[0] + span[1]))
+# Times on a grid, so that many overlap as much as another, and many lie exactly as far away as is allowed.
+times = st.integers(0, 60).map(lambda n: n / 10)
+spans = st.tuples(times | st.floats(0, 60), times | st.floats(0, 3)).map(lambda span: (span[0], span[0] + span[1]))
 labels = st.sampled_from(["one_tap", "swipe_up", NONE])
 
 
@@ -74,9 +76,25 @@ def test_everything_is_counted_once(performances, events):
 
 @given(st.lists(st.tuples(labels, spans)), st.lists(spans))
 def test_many_belong_to_whom_each_of_them_belongs(performances, heard):
-    acts = sorted((Performed(label, label, *span) for label, span in performances), key=lambda act: act.onset)
+    acts = [Performed(label, label, *span) for label, span in performances]
     expected = [id(whose(onset, offset, acts)) for onset, offset in heard]
     assert [id(found) for found in owners(heard, acts)] == expected
+
+
+@given(st.lists(st.tuples(labels, spans)), st.lists(st.tuples(st.sampled_from(["one_tap", "unknown"]), spans)))
+def test_a_whole_recording_is_judged_as_event_by_event(performances, events):
+    def acts():
+        return [Performed(label, str(n), *span) for n, (label, span) in enumerate(performances)]
+
+    def told(outcomes):
+        return [(one.verdict, one.performed and vars(one.performed), one.event, one.latency_s) for one in outcomes]
+
+    heard = [said(name, *span) | {"decided": span[1] + 0.3} for name, span in events]
+    slow = Tally(acts())
+    expected = [outcome for event in heard if (outcome := slow.hear(event, event["decided"]))] + slow.settle(math.inf)
+    tally, outcomes = tallied(acts(), heard)
+    assert told(outcomes) == told(expected)
+    assert tally == slow
 
 
 def test_what_was_said_early_is_counted_with_its_lead():

@@ -16,7 +16,7 @@ from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
-from gestured.record.judge import NONE, Outcome, Performed, Tally
+from gestured.record.judge import NONE, Outcome, Performed, tallied
 from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
@@ -59,15 +59,11 @@ class Labelled:
         """Hold the events of a replay against the labels."""
         performed = list(self.performed())
         asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
-        tally = Tally(waiting=performed)
-        outcomes = [tally.hear(line, line["decided"]) for line in lines if line["type"] in ("gesture", "unknown")]
-        outcomes += tally.settle(float("inf"))
+        _, outcomes = tallied(performed, (line for line in lines if line["type"] in ("gesture", "unknown")))
         found = [
             outcome
             for outcome in outcomes
-            if outcome is not None
-            and outcome.verdict in DIFFERENT
-            and (outcome.performed is None or id(outcome.performed) in asked)
+            if outcome.verdict in DIFFERENT and (outcome.performed is None or id(outcome.performed) in asked)
         ]
         found.sort(key=lambda one: one.performed.onset if one.performed else float((one.event or {})["onset"]))
         skipped = len(performed) - len(asked)

@@ -11,6 +11,7 @@ from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
+from gestured.record import judge
 from gestured.record.judge import Outcome, Performed, Tally
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
@@ -57,9 +58,5 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
 
 def tallied(take: Take, zero: float, events: list[dict[str, Any]]) -> tuple[Tally, list[Outcome]]:
     """The tally of a take whose time 0 was at `zero` (epoch seconds), and what became of each gesture that was told."""
-    tally = Tally()
-    for act in take.events:
-        tally.begin(Performed(act.label, act.kind, zero + act.onset_s, zero + act.offset_s))
-    outcomes = [outcome for event in events if (outcome := tally.hear(event, event["decided"]))]
-    tally.settle(float("inf"))
-    return tally, outcomes
+    performed = [Performed(act.label, act.kind, zero + act.onset_s, zero + act.offset_s) for act in take.events]
+    return judge.tallied(performed, events)

@@ -6,6 +6,7 @@ performance, and one of what is no gesture are `false`. A gesture of which none 
 Times are seconds on any clock that both sides share.
 """
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from typing import Any, Protocol, TypeVar
 LEAST = 20  # gestures, of which percentiles say something
 NONE = "none"  # the label of whatever is no gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
+REACH_S = 2 * TOLERANCE_S  # what lies farther away belongs to something else, however the times were rounded
 MISSED_AFTER_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
 
 
@@ -49,15 +51,16 @@ def whose(onset: float, offset: float, performed: Iterable[A]) -> A | None:
 
 def owners(spans: Sequence[tuple[float, float]], performed: Iterable[A]) -> list[A | None]:
     """Whose each (onset, offset) in s is, as `whose` has it, where there are too many to look at all."""
-    ahead = deque(sorted(performed, key=lambda act: act.onset))
-    near: list[A] = []
+    ahead = deque(sorted(enumerate(performed), key=lambda one: one[1].onset))
+    near: dict[int, A] = {}  # by place in `performed`, whose order decides between two that overlap as much
     found: list[A | None] = [None] * len(spans)
     for n in sorted(range(len(spans)), key=lambda n: spans[n][0]):
         onset, offset = spans[n]
-        while ahead and ahead[0].onset < offset + TOLERANCE_S:
-            near.append(ahead.popleft())
-        near = [act for act in near if act.offset > onset - TOLERANCE_S]
-        found[n] = whose(onset, offset, near)
+        while ahead and ahead[0][1].onset < offset + REACH_S:
+            place, act = ahead.popleft()
+            near[place] = act
+        near = {place: act for place, act in near.items() if act.offset > onset - REACH_S}
+        found[n] = whose(onset, offset, [near[place] for place in sorted(near)])
     return found
 
 
@@ -138,7 +141,10 @@ class Tally:
         if event["type"] == "provisional":
             self.given, self._early = self.given + 1, event
             return None
-        performed = whose(event["onset"], event["offset"], self.waiting)
+        return self.judge(event, arrived, whose(event["onset"], event["offset"], self.waiting))
+
+    def judge(self, event: Mapping[str, Any], arrived: float, performed: Performed | None) -> Outcome | None:
+        """The same for a gesture or unknown event, where it is known already to what it belongs."""
         early = self._early if event.get("provisional") else None
         if early is not None and event["provisional"] == "confirmed":
             self.leads.append(event["offset"] - early["decided"])
@@ -157,9 +163,9 @@ class Tally:
 
     def settle(self, now: float) -> list[Outcome]:
         """What nothing can come for any more."""
-        over = [performed for performed in self.waiting if performed.offset + MISSED_AFTER_S <= now]
-        self.waiting = [performed for performed in self.waiting if performed not in over]
-        silent = [performed for performed in over if not performed.answered]
+        over = [performed.offset + MISSED_AFTER_S <= now for performed in self.waiting]
+        silent = [one for one, late in zip(self.waiting, over, strict=True) if late and not one.answered]
+        self.waiting = [one for one, late in zip(self.waiting, over, strict=True) if not late]
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]
 
     def summary(self) -> dict[str, Any]:
@@ -176,3 +182,14 @@ class Tally:
     def _count(self, outcome: Outcome) -> Outcome:
         self.counts[outcome.verdict] += 1
         return outcome
+
+
+def tallied(performed: Sequence[Performed], events: Iterable[Mapping[str, Any]]) -> tuple[Tally, list[Outcome]]:
+    """All that was performed, and all gestures and unknowns that were said of it, once it is over.
+
+    The outcomes are those of the events, in their order, and then of what nothing was said of.
+    """
+    tally, heard = Tally(list(performed)), list(events)
+    belongs = owners([(event["onset"], event["offset"]) for event in heard], performed)
+    told = [tally.judge(event, event["decided"], act) for event, act in zip(heard, belongs, strict=True)]
+    return tally, [outcome for outcome in told if outcome] + tally.settle(math.inf)

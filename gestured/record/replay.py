@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -90,8 +91,8 @@ class Played:
 
     def knew(self, t: float) -> bool:
         """Whether the idle sensor had been learned by `t` s, so that a touch could be told from it."""
-        since = [known for new, known in self._learned if new <= t + 1e-6]  # stamps and labels are rounded
-        return bool(since) and since[-1] <= t
+        before = bisect_right(self._learned, t + 1e-6, key=lambda one: one[0])  # stamps and labels are rounded
+        return before > 0 and self._learned[before - 1][1] <= t
 
 
 def frames_used(tape: Tape, scene: Scene) -> dict[str, list[Frame]]:
