@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 import time
 from typing import Any
 
@@ -10,7 +11,7 @@ import torch
 from gestured.client.say import say, say_drawn
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
-from gestured.lab.export import write_manifest
+from gestured.lab.export import measured, plain, write_manifest
 from gestured.lab.fit import RECURRENT
 from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
@@ -40,7 +41,7 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     start = time.monotonic()
     train(plan, args.out, args.cache, args.real, args.jobs, args.recordings)
     minutes = (time.monotonic() - start) / 60
-    say(f"trained in {minutes:.1f} minutes (finished steps are taken from {args.cache})")
+    say(f"trained in {minutes:.1f} minutes (finished steps are taken from {args.cache})", to=sys.stderr)
     for name in RECURRENT:
         people = own.QUICK_PEOPLE if args.quick else own.PEOPLE
         own.teach(args.out / f"{name}.onnx", args.cache, people, args.jobs)
@@ -49,17 +50,18 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
 def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     """Print the figures, and keep them in the manifest, the cards and a document."""
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
-    for path in paths.values():
+    before: dict[str, dict[str, Any]] = {}
+    for name, path in paths.items():
         open_model(path)  # says what is wrong before anything is simulated
+        before[name] = measured(path)
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
     found = simulated_figures(paths, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of
-    say(*table(figures))
-    write_manifest(args.models, figures)
-    write_cards(args.models, figures, plan)
+    say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
+    kept = plain({name: before[name] | of for name, of in figures.items()})  # without --real, what stood there of it
+    write_manifest(args.models, kept)
+    write_cards(args.models, kept, plan)
     if args.document:
         write_blocks(args.document, args.models, figures, args.words)
-    if args.json:
-        say_drawn(json.dumps(figures, indent=2))

@@ -4,6 +4,7 @@ Simulated figures are of the exported .onnx files themselves. Real figures are o
 the subjects they are judged on (three folds).
 """
 
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -181,7 +182,8 @@ def real_figures(plan: TrainingPlan, data: TrainingData, cache: Path) -> dict[st
     """
     real = data.real
     if real is None:
-        say("real recordings: left out, since no --real FOLDER was named")
+        words = "left out, since no --real FOLDER was named; their figures of the same models stay"
+        say(f"real recordings: {words}", to=sys.stderr)
         return {}
     trained, labels = learn(plan, data, cache), targets(real)
     calibrated = calibration_set(trained, data)

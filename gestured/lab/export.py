@@ -230,10 +230,16 @@ NAME = "manifest.json"
 
 
 def measured(model: Path) -> dict[str, Any]:
-    """What the manifest beside a model file holds of figures of this very file; empty where it knows another one."""
+    """What the manifest beside a model file holds of figures of this very file; empty where it knows another one.
+
+    ModelError where it is no manifest.
+    """
     manifest = model.with_name(NAME)
-    entry = json.loads(manifest.read_text())["models"].get(model.name, {}) if manifest.exists() else {}
-    figures: dict[str, Any] = entry.get("figures", {})
+    try:
+        entry = json.loads(manifest.read_text())["models"].get(model.name, {}) if manifest.exists() else {}
+        figures: dict[str, Any] = entry.get("figures", {})
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise ModelError(f"{manifest}: expected what gestured-lab evaluate writes: {error!r}") from error
     return figures if entry.get("sha256") == file_digest(model) else {}
 
 
@@ -259,11 +265,11 @@ def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
             "figures": figures.get(path.stem, {}),
         }
     with atomic_write(directory / NAME, PUBLIC) as file:
-        file.write((json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
+        file.write((json.dumps({"models": plain(models)}, indent=2, allow_nan=False) + "\n").encode())
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """The same with null for what is not a finite number: JSON has no NaN."""
     if isinstance(value, Mapping):
-        return {key: _plain(of) for key, of in value.items()}
+        return {key: plain(of) for key, of in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -8,6 +8,7 @@ folds, which share what was learned from simulation.
 
 import hashlib
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -318,7 +319,7 @@ def train(
         module, calibration, answered = judged(trained, name, calibrated, data)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
         points = measured_points(trained, module, name, data, plan)
-        say_drawn(f"{name}\n{by_strictness(points)}")
+        say_drawn(f"{name}\n{by_strictness(points)}", to=sys.stderr)
         rule = contacts.rule(name, module, np.array(list(points[USUAL]["thresholds"].values())))
         more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
         export_net(module, out / f"{name}.onnx", Facts(**common, **more))

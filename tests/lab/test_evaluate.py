@@ -1,5 +1,6 @@
 """Figures are counted as a user would count them."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,9 +11,13 @@ from scipy import stats
 from gestured.lab import commands, evaluate
 from gestured.lab.cli import main
 from gestured.lab.evaluate import outcome, worst
+from gestured.lab.export import write_manifest
 from gestured.lab.fit import CLASSES
 from gestured.lab.intervals import CONFIDENCE_LEVEL, student
 from gestured.lab.samples import Samples
+from gestured.lab.train import MIXED
+from gestured.model.shipped import LADDER
+from tests.small_model import build
 
 THREE = np.eye(3, dtype=np.float32)
 
@@ -107,14 +112,32 @@ def test_the_worst_is_found_among_those_that_are_there_often_enough() -> None:
     }  # fmt: skip
 
 
-def test_without_real_recordings_no_network_is_loaded_or_trained(
+def share(right: float) -> dict[str, object]:
+    """Figures of one set, as a manifest has them."""
+    shares = {"right": right, "wrong": 0.0, "lost": 1 - right, "rejected": 1.0}
+    ends = {name: {"low": value, "high": value} for name, value in shares.items()}
+    return {"gestures": 10, "others": 10, "right_before": right, **shares, "people": 3, "intervals": ends, "kinds": {}}
+
+
+def test_without_real_recordings_their_figures_stay_of_the_same_files_and_no_network_is_needed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in ("open_model", "write_manifest", "write_cards"):
-        monkeypatch.setattr(commands, name, lambda *_: None)
+    for name in LADDER:
+        build(tmp_path / f"{name}.onnx")
+    write_manifest(
+        tmp_path, {name: {"simulated": {"wide": share(0.1)}, "real": {MIXED: share(0.75)}} for name in LADDER}
+    )
+    build(tmp_path / "lstm.onnx", version="9")  # another file than the figures are of
     monkeypatch.setattr(commands, "load_data", lambda *_: SimpleNamespace(real=None))
-    monkeypatch.setattr(commands, "simulated_figures", lambda *_: {})
+    monkeypatch.setattr(commands, "simulated_figures", lambda *_: dict.fromkeys(LADDER, {"wide": share(0.5)}))
     for module in (commands, evaluate):
         monkeypatch.setattr(module, "learn", lambda *_: pytest.fail("learns what nothing asks for"), raising=False)
-    assert main(["evaluate", "--cache", str(tmp_path)]) == 0
-    assert "left out, since no --real FOLDER was named" in capsys.readouterr().out
+    assert main(["evaluate", "--models", str(tmp_path), "--cache", str(tmp_path / "cache")]) == 0
+    assert (
+        "left out, since no --real FOLDER was named; their figures of the same models stay" in capsys.readouterr().err
+    )
+    manifest = json.loads((tmp_path / "manifest.json").read_text())["models"]
+    for name in LADDER:
+        card, figures = (tmp_path / f"{name}.md").read_text(), manifest[f"{name}.onnx"]["figures"]
+        assert figures["simulated"]["wide"]["right"] == 0.5 and "0.500 (0.500" in card
+        assert ("real" in figures) == (f"| real, {MIXED}" in card) == (name != "lstm")

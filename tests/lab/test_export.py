@@ -269,6 +269,13 @@ def test_figures_are_of_the_very_file_that_was_measured(net: tuple[Net, Path], t
     assert measured(path) == {}
 
 
+@pytest.mark.parametrize("text", ["<<<<<<< ours", "[]", '{"models": []}'])
+def test_a_manifest_that_is_none_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(ModelError, match=r"manifest\.json: expected what gestured-lab evaluate writes"):
+        measured(tmp_path / "cnn_lstm.onnx")
+
+
 def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: tuple[Net, Path], tmp_path: Path) -> None:
     proto = onnx.load(net[1])
     del proto.metadata_props[:]
