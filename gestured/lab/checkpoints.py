@@ -5,15 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.record.files import PUBLIC, atomic_write
-
-
-def save_nets(path: Path, nets: nn.ModuleDict) -> None:
-    """Weights as plain arrays, without pickles."""
-    _write(path, {name: value.numpy() for name, value in nets.state_dict().items()})
+from gestured.lab.arrays import load, save
 
 
 def store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epochs: int) -> None:
@@ -21,23 +15,22 @@ def store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epo
     arrays = {f"net.{name}": value.numpy() for name, value in nets.state_dict().items()}
     for i, state in optimiser.state_dict()["state"].items():
         arrays |= {f"optimiser.{i}.{name}": value.numpy() for name, value in state.items()}
-    _write(path, arrays | {"epochs": np.array(epochs)})
+    save(path, arrays | {"epochs": np.array(epochs)})
 
 
 def restore(
     path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, schedule: torch.optim.lr_scheduler.LRScheduler
 ) -> int:
     """Take up a run where `store` left it; returns the epochs that are done, 0 without a checkpoint."""
-    if not path.exists():
+    stored = load(path)
+    if stored is None:
         return 0
-    with np.load(path, allow_pickle=False) as stored:
-        nets.load_state_dict({n[4:]: torch.from_numpy(stored[n]) for n in stored.files if n.startswith("net.")})
-        state: dict[int, dict[str, Tensor]] = {}
-        for name in stored.files:
-            if name.startswith("optimiser."):
-                _, i, key = name.split(".")
-                state.setdefault(int(i), {})[key] = torch.from_numpy(stored[name])
-        epochs = int(stored["epochs"])
+    nets.load_state_dict({n[4:]: torch.from_numpy(value) for n, value in stored.items() if n.startswith("net.")})
+    state: dict[int, dict[str, Tensor]] = {}
+    for name, value in stored.items():
+        if name.startswith("optimiser."):
+            _, i, key = name.split(".")
+            state.setdefault(int(i), {})[key] = torch.from_numpy(value)
     whole = optimiser.state_dict()
     optimiser.load_state_dict({**whole, "state": state})
     steps = int(next(iter(state.values()))["step"]) if state else 0
@@ -45,10 +38,4 @@ def restore(
         warnings.simplefilter("ignore", UserWarning)  # of a step before the optimiser's
         for _ in range(steps):
             schedule.step()
-    return epochs
-
-
-def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC) as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
+    return int(stored["epochs"])

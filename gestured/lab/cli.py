@@ -19,6 +19,11 @@ CACHE = Path(".cache/lab")
 MODELS = Path("models")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
+# Flags that name a folder in which files are written.
+FOLDERS = {
+    "train": ("out", "cache"), "evaluate": ("models", "cache"), "adapt": ("cache",), "study": ("out", "cache"),
+    "collect": ("out",),
+}  # fmt: skip
 KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that go on where they were interrupted
 INTERRUPTED = 130  # the exit status after Ctrl-C, as a shell has it
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
@@ -163,7 +168,7 @@ def _run(args: argparse.Namespace) -> int:
         status: int = module.run(args)
         return status
     except OSError as error:
-        raise GesturedError(str(error)) from error
+        raise GesturedError(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error
     except KeyboardInterrupt:
         kept = "; what is finished is kept" if args.command in KEEPS else ""
         say("", f"gestured-lab: interrupted{kept}", to=sys.stderr)
@@ -190,6 +195,11 @@ def _check(args: argparse.Namespace) -> None:
     file = getattr(args, flag := FILES.get(args.command, ""), None)
     if file and not (os.access(file.parent, os.W_OK) and (file.is_file() or not file.exists())):
         raise GesturedError(f"--{flag}: expected a file in a folder that can be written to, found {file}")
+    for flag in FOLDERS.get(args.command, ()):
+        if (folder := getattr(args, flag)) is not None:
+            there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+            if not (there.is_dir() and os.access(there, os.R_OK | os.W_OK | os.X_OK)):
+                raise GesturedError(f"--{flag}: expected a folder that can be read and written, found {folder}")
 
 
 if __name__ == "__main__":

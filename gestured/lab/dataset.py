@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
+from gestured.lab.arrays import load, save
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, WINDOW, Sample, Samples, collect, sample
 from gestured.record.check import UNNAMED
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.record.judge import whose
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
@@ -208,14 +208,11 @@ def _while_alive(made: "IMapIterator[T]", workers: Sequence[BaseProcess]) -> Ite
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
     """The first `count` takes of one of `STREAMS`, from `cache` where they were made before."""
     path = cache / f"{stream}-{seed}-{count}-{code_digest(__name__)[:12]}.npz"
-    if path.exists():
-        with np.load(path, allow_pickle=False) as stored:
-            return Samples(*(stored[name] for name in Samples.__slots__))
+    if stored := load(path):
+        return Samples(**stored)
     made = in_processes(partial(STREAMS[stream], seed), range(count), jobs, f"simulating {stream}")
     samples = collect(s for found in made for s in found)
-    cache.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC) as file:
-        np.savez(file, **{name: getattr(samples, name) for name in Samples.__slots__})
+    save(path, {name: getattr(samples, name) for name in Samples.__slots__})
     return samples
 
 

@@ -25,10 +25,10 @@ from gestured.core.window import Window
 from gestured.lab.digest import file_digest
 from gestured.lab.forest import OPSET, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
+from gestured.lab.written import write
 from gestured.model.context import CALM, calm, chosen
 from gestured.model.file import SelfTest, sealed
 from gestured.model.model import Model
-from gestured.record.files import PUBLIC, atomic_write
 
 Outputs = tuple[NDArray[np.float32], ...]  # scores (B, G), unknown (B,), perhaps an embedding (B, E)
 
@@ -162,8 +162,7 @@ def _finish(
     except (ValueError, onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         raise ModelError(f"{path}: not written: {error}") from error
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC) as file:
-        file.write(data)
+    write(path, data)
 
 
 def _compare(
@@ -264,8 +263,7 @@ def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
             "gestures": list(model.gestures),
             "figures": figures.get(path.stem, {}),
         }
-    with atomic_write(directory / NAME, PUBLIC) as file:
-        file.write((json.dumps({"models": plain(models)}, indent=2, allow_nan=False) + "\n").encode())
+    write(directory / NAME, json.dumps({"models": plain(models)}, indent=2, allow_nan=False) + "\n")
 
 
 def plain(value: Any) -> Any:

@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from gestured.lab.arrays import load, save
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.checkpoints import restore, store
 from gestured.lab.nets import CnnLstm, Lstm, Opinion
@@ -258,9 +259,12 @@ def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
     return dict(zip(nets, found, strict=True))
 
 
-def load_nets(path: Path) -> nn.ModuleDict:
-    """The networks that `save_nets` wrote into a file."""
-    with np.load(path, allow_pickle=False) as stored:
-        nets = build(dict.fromkeys(name.split(".")[0] for name in stored.files))
-        nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})
+def kept_nets(path: Path, make: Callable[[], nn.ModuleDict]) -> nn.ModuleDict:
+    """The networks that `make` gives, from their file where they were made before."""
+    stored = load(path)
+    if stored is None:
+        stored = {name: value.numpy() for name, value in make().state_dict().items()}
+        save(path, stored)
+    nets = build(dict.fromkeys(name.split(".")[0] for name in stored))
+    nets.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
     return nets

@@ -24,13 +24,12 @@ from gestured.client.say import say_drawn
 from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL
 from gestured.lab.adapt.material import own_recordings
-from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import DAY_S, OTHER_TRIALS, TRIALS, meant_on, recorded, simulated
 from gestured.lab.decide import calibration_of, confidence, decided, fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.early import Foretold
 from gestured.lab.export import Facts, export_forest, export_net, write_manifest
-from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, targets
+from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, kept_nets, logits, pretrain, targets
 from gestured.lab.forest import grow_forest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.points import by_strictness, operating_points
@@ -205,10 +204,8 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
     """Both stages and the folds of these networks; what is done already is read from the cache."""
     told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest(), names])
     key = hashlib.sha256(told.encode()).hexdigest()[:12]
-    first = cache / f"simulated-{key}.npz"
-    if not first.exists():
-        save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz", names))
-    start = load_nets(first)
+    checkpoint = cache / f"checkpoint-{key}.npz"
+    start = kept_nets(cache / f"simulated-{key}.npz", lambda: pretrain(data.teach, plan.fit, checkpoint, names))
     if data.real is None:
         return Trained(start, None)
     key += data.real.digest()[:6]
@@ -225,9 +222,7 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
 def _kept(
     path: Path, start: nn.ModuleDict, data: TrainingData, real: Samples, plan: TrainingPlan, title: str
 ) -> nn.ModuleDict:
-    if not path.exists():
-        save_nets(path, finetune(start, data.teach, real, plan.fit, title))
-    return load_nets(path)
+    return kept_nets(path, lambda: finetune(start, data.teach, real, plan.fit, title))
 
 
 @dataclass(frozen=True, slots=True)

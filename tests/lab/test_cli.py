@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.lab.cli import LAB_PACKAGES, main, parser
+from gestured.lab.cli import FOLDERS, LAB_PACKAGES, main, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 from gestured.record.arrays import write
@@ -121,16 +121,28 @@ def test_what_no_command_can_work_with_is_named(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("line", ["train --out", "train --cache", "study --out"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(f"{command} --{flag}" for command, flags in FOLDERS.items() if command not in ("adapt", "collect")
+          for flag in flags),
+        "adapt no.npz --out my.onnx --cache", "collect --participant 07 --out",
+    ],
+)  # fmt: skip
 @pytest.mark.usefixtures("lab")
-def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
+def test_a_folder_that_cannot_be_written_to_is_named_before_anything_is_simulated(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
-    assert main([*line.split(), "taken"]) == 1
-    (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith("gestured-lab: ") and "taken" in said
+    (tmp_path / "shut").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "shut")  # root may do everything
+    flag = line.split()[-1]
+    words = f"gestured-lab: {flag}: expected a folder that can be read and written, found "
+    for folder in ("taken", "taken/new", "shut", "shut/new"):
+        assert main([*line.split(), folder]) == 1
+        assert capsys.readouterr().err == f"{words}{folder}\n"
+    assert {path.name for path in tmp_path.iterdir()} == {"taken", "shut"}
 
 
 def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,7 +4,7 @@ import errno
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -199,9 +199,22 @@ def test_what_is_kept_has_come_onto_the_disk(tmp_path: Path, monkeypatch: pytest
 
     monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match=r"No space left on device: '.*/wide-9-1-.*\.npz'"):
         simulated(tmp_path, "wide", 9, 1)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"garbage"])
+def test_what_is_kept_and_damaged_is_made_again(
+    damage: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
+    made = simulated(tmp_path, "wide", 9, 1)
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    same(simulated(tmp_path, "wide", 9, 1), made)
+    assert path.read_bytes() == whole
 
 
 # --- putting sets together ---

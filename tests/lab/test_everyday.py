@@ -291,7 +291,7 @@ def test_a_disk_without_room_for_the_picture_takes_no_figures_away(
     assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 1
     out, err = capsys.readouterr()
     assert "### By gesture" in out and list(tmp_path.iterdir()) == []
-    assert err == f"gestured-lab: [Errno 28] No space left on device: '{tmp_path}/curve.svg'\n"
+    assert err == f"gestured-lab: {tmp_path}/curve.svg: No space left on device\n"
 
 
 def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:

@@ -10,7 +10,6 @@ import torch
 from torch import nn
 
 from gestured.lab import dataset, fit, train
-from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
@@ -19,7 +18,7 @@ from gestured.lab.fit import (
     balanced,
     build,
     finetune,
-    load_nets,
+    kept_nets,
     logits,
     padded,
     pretrain,
@@ -100,9 +99,9 @@ def test_training_changes_every_net_and_lowers_the_loss(whole: tuple[nn.ModuleDi
 
 def test_weights_survive_the_file(samples: Samples, tmp_path: Path) -> None:
     torch.manual_seed(3)
-    nets = build()
-    save_nets(tmp_path / "new" / "nets.npz", nets)
-    alike(nets, load_nets(tmp_path / "new" / "nets.npz"))
+    nets, path = build(), tmp_path / "new" / "nets.npz"
+    alike(nets, kept_nets(path, lambda: nets))
+    alike(nets, kept_nets(path, lambda: pytest.fail("made again")))
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["nets.npz"]
 
 

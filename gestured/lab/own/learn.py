@@ -19,10 +19,10 @@ from gestured.core.own import EXAMPLES
 from gestured.lab.export import NAME, measured, write_manifest
 from gestured.lab.own.play import PLAN, REPETITIONS, SIGNS, played
 from gestured.lab.samples import Samples
+from gestured.lab.written import write
 from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.model.prototypes import Array, Prototype, Space
-from gestured.record.files import PUBLIC, atomic_write
 
 ACCEPTED = (
     0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised
@@ -220,8 +220,7 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
         Model(data, path.stem)
     except ValueError as error:
         raise ModelError(f"{path}: not written: {error}") from error
-    with atomic_write(path, PUBLIC) as file:
-        file.write(data)
+    write(path, data)
     if path.with_name(NAME).exists():
         write_manifest(path.parent, figures_of)
     return space

@@ -7,7 +7,6 @@ that collects the results, so that workers on other machines need no common fold
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -63,14 +62,8 @@ class Schedule:
         return found
 
     def _computed(self, todo: Sequence[Task], sets: Mapping[str, Data]) -> Iterator[tuple[Task, Result]]:
-        if not todo:
-            return
-        with _backend(self.cluster, sets):
-            jobs = -1 if self.cluster else self.jobs
-            calls = (delayed(compute)(task, sets[task.data]) for task in todo)
-            yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2 * n_jobs", batch_size=1)(
-                calls
-            )
+        if todo:
+            yield from _here(todo, sets, self.jobs) if self.cluster is None else _there(todo, sets, self.cluster)
 
 
 def compute(task: Task, data: Data) -> tuple[Task, Result]:
@@ -78,27 +71,41 @@ def compute(task: Task, data: Data) -> tuple[Task, Result]:
     return task, run(task, data)
 
 
-@contextmanager
-def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
-    """joblib's own processes, or Dask's workers behind a scheduler's address. GesturedError where one is killed."""
-    if cluster is None:
-        try:
-            with parallel_config(backend="loky", inner_max_num_threads=1):
-                yield
-        except TerminatedWorkerError:
-            reason = "as where there is too little memory"
-            raise GesturedError(f"a process that --jobs started was killed, {reason}") from None
-        return
+def _here(todo: Sequence[Task], sets: Mapping[str, Data], jobs: int) -> Iterator[tuple[Task, Result]]:
+    """Compute in joblib's own processes. GesturedError where one is killed."""
+    calls = (delayed(compute)(task, sets[task.data]) for task in todo)
     try:
-        from distributed import Client
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2 * n_jobs", batch_size=1)(
+                calls
+            )
+    except TerminatedWorkerError:
+        reason = "as where there is too little memory"
+        raise GesturedError(f"a process that --jobs started was killed, {reason}") from None
+
+
+def _there(todo: Sequence[Task], sets: Mapping[str, Data], cluster: str) -> Iterator[tuple[Task, Result]]:
+    """Compute on Dask's workers behind a scheduler's address. GesturedError where that cannot be done.
+
+    Not by joblib's backend, which waits for ever for the result of a worker that was killed.
+    """
+    try:
+        from distributed import CancelledError, Client, KilledWorker, as_completed
     except ModuleNotFoundError:
         raise GesturedError("--cluster needs distributed: pip install 'gestured[cluster]'") from None
     try:
         client = Client(cluster, timeout=10)
     except (OSError, ValueError) as error:
         raise GesturedError(f"--cluster: no Dask scheduler answers at {cluster}: {error}") from error
-    with client, parallel_config(backend="dask", scatter=list(sets.values())):
-        yield
+    with client:
+        held = {name: client.scatter(data, broadcast=True) for name, data in sets.items()}
+        futures = [client.submit(compute, task, held[task.data], pure=False) for task in todo]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except (KilledWorker, CancelledError):
+            reason = "as where there is too little memory; what is finished is kept"
+            raise GesturedError(f"--cluster: workers or the scheduler at {cluster} were killed, {reason}") from None
 
 
 def keep(path: Path, result: Any) -> None:

@@ -6,6 +6,7 @@ stand recordings that it does not hold: the public development recordings, and t
 """
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,12 +18,12 @@ from numpy.typing import NDArray
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.lab.arrays import load, save
 from gestured.lab.dataset import TRIALS, cuts, in_processes, matched, recorded, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.samples import WINDOW, Samples, collect, sample
 from gestured.lab.train import REAL_FILES
 from gestured.record.arrays import read
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE, Trial, cohort_take
 
 SEED = 0  # of the cohort that learns and is judged
@@ -86,24 +87,23 @@ def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int, seed: int = S
     """A cohort's gestures of these trials, from `cache` where they were made before."""
     key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
     path = cache / f"study-cohort-{seed}-{len(trials)}-{key[:12]}.npz"
-    if not path.exists():
-        _write(path, trials, list(in_processes(partial(_cut, seed), trials.tolist(), jobs, "simulating the cohort")))
-    with np.load(path, allow_pickle=False) as stored:
-        return Cohort(**{name: stored[name] for name in stored.files}, performed=len(trials))
+    fields = load(path)
+    if fields is None:
+        fields = _fields(trials, in_processes(partial(_cut, seed), trials.tolist(), jobs, "simulating the cohort"))
+        save(path, fields)
+    return Cohort(**fields, performed=len(trials))
 
 
-def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]) -> None:
+def _fields(trials: NDArray[np.int64], segments: Iterable[Segment | None]) -> dict[str, NDArray[Any]]:
     cut = [(index, segment) for index, segment in zip(trials, segments, strict=True) if segment is not None]
     kept = [segment for _, segment in cut]
-    fields: dict[str, Any] = {
+    return {
         "frames": np.concatenate([s.frames for s in kept]).astype(np.float32),
         "times": np.concatenate([s.times for s in kept]), "noise": np.array([s.noise for s in kept]),
         "offsets": np.cumsum([0, *(len(s.frames) for s in kept)], dtype=np.int64),
         "first": np.array([s.first for s in kept], np.int64), "last": np.array([s.last for s in kept], np.int64),
         "trial": np.array([index for index, _ in cut], np.int64),
     }  # fmt: skip
-    with atomic_write(path, PUBLIC) as file:
-        np.savez(file, **fields)
 
 
 REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no textile"

@@ -114,13 +114,25 @@ def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
     assert without_time(together) == without_time(alone)  # type: ignore[arg-type]
 
 
-def test_a_process_that_is_killed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def killed(folder: Path, monkeypatch: pytest.MonkeyPatch, address: str | None) -> str:
+    """What is said where whatever computes is killed."""
     # By value, so that the processes need not import this file and what it stands on.
     monkeypatch.setattr(cells, "compute", lambda *_: __import__("os").kill(__import__("os").getpid(), 9))
     task: Any = SimpleNamespace(data="simulated")
     data: Any = None
-    with pytest.raises(GesturedError, match="a process that --jobs started was killed"):
-        list(Schedule(tmp_path, 2)._computed([task, task], {"simulated": data}))
+    with pytest.raises(GesturedError) as raised:
+        list(Schedule(folder, 2, address)._computed([task, task], {"simulated": data}))
+    return str(raised.value)
+
+
+def test_a_process_that_is_killed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "a process that --jobs started was killed" in killed(tmp_path, monkeypatch, None)
+
+
+def test_workers_of_a_cluster_that_are_killed_are_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cluster: str
+) -> None:
+    assert f"--cluster: workers or the scheduler at {cluster} were killed" in killed(tmp_path, monkeypatch, cluster)
 
 
 def test_without_a_scheduler_one_sentence_says_so(tmp_path: Path) -> None:
