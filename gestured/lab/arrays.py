@@ -24,4 +24,4 @@ def save(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a file, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replaced(path) as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays)  # type: ignore[arg-type]

@@ -200,7 +200,3 @@ def _check(args: argparse.Namespace) -> None:
             there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
             if not (there.is_dir() and os.access(there, os.R_OK | os.W_OK | os.X_OK)):
                 raise GesturedError(f"--{flag}: expected a folder that can be read and written, found {folder}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -169,7 +169,7 @@ def test_a_log_on_a_full_disk_stops_nothing_and_a_terminal_need_not_have_all_let
     take = gesture_take("swipe_left", Participant(901), SimulatedSensor.nominal(day=901), generator(3, 1))
     one = np.array([0, len(take.times)]), np.array(["session"]), np.array(["07"])
     write(tmp_path / "né\x1b.npz", Recordings(take.frames, take.times, *one))
-    command = [sys.executable, "-m", "gestured.lab.cli", "everyday", "lstm", "--jobs", "1", "--recordings"]
+    command = [sys.executable, "-m", "gestured.lab", "everyday", "lstm", "--jobs", "1", "--recordings"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
     with open("/dev/full", "w") as full:
         done = subprocess.run(

@@ -32,7 +32,7 @@ GOOD = "Enter keep  " + KEYS
 def collect(folder: Path, port: int, *more: str) -> "closing[Terminal]":
     """Somebody in front of `gestured-lab collect`, who performs taps."""
     flags = ("--participant", "07", "--out", folder, "--listen", f"127.0.0.1:{port}", "--gestures", "one_tap")
-    return closing(Terminal("gestured.lab.cli", "collect", *flags, "--countdown", "0", *more))
+    return closing(Terminal("gestured.lab", "collect", *flags, "--countdown", "0", *more))
 
 
 def keeps_one(person: Terminal) -> None:
