@@ -3,6 +3,7 @@
 import argparse
 import io
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -17,6 +18,7 @@ from gestured.core.errors import GesturedError
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
+JOBS = number(1, 1000, whole=True)
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 FILES = {"everyday": "svg", "adapt": "out", "import": "out"}  # the flag that names a file to be written
 # Flags that name a folder in which files are written.
@@ -45,7 +47,7 @@ def parser() -> Parser:
     from gestured.core.listening import Arming
     from gestured.core.points import STRICTNESS, USUAL
     from gestured.lab.everyday import FIRST as FIRST_DAY
-    from gestured.lab.recordings.flags import LARGEST_SEED, add_recordings
+    from gestured.lab.recordings.flags import SEED, add_recordings
 
     top, commands = program(
         "gestured-lab", "COMMAND", "Train and evaluate gestured's models.",
@@ -64,7 +66,7 @@ def parser() -> Parser:
         command.add_argument(
             "--cache", type=Path, default=CACHE, help=f"where finished steps are kept (default: {CACHE})"
         )
-        command.add_argument("--jobs", type=int, default=2, help="processes and threads (default: 2)")
+        command.add_argument("--jobs", type=JOBS, default=2, help="processes and threads (default: 2)")
         command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
         command.add_argument("--real", type=Path, metavar="FOLDER", help="folder of real recordings, as "
                              "docs/training.md has it (default: simulated people alone)")  # fmt: skip
@@ -91,7 +93,11 @@ def parser() -> Parser:
         "--cache", type=Path, metavar="DIR", help="for simulated takes (default: gestured, in your cache folder)"
     )
     adapt.add_argument(
-        "--steps", type=int, default=200, metavar="N", help="training steps for each held-out group (default: 200)"
+        "--steps",
+        type=number(1, 10_000, whole=True),
+        default=200,
+        metavar="N",
+        help="training steps for each held-out group (default: 200)",
     )
     evaluate = add("evaluate", "print the accuracy of models on people that they have not learned from; "
                    "writes cards and manifest",
@@ -106,7 +112,12 @@ def parser() -> Parser:
                    "gestured-lab everyday cnn_lstm --hours 10 --svg curve.svg")  # fmt: skip
     everyday.add_argument("model", nargs="?", default="cnn_lstm", metavar="MODEL",
                           help="a shipped model, or a file (default: cnn_lstm)")  # fmt: skip
-    everyday.add_argument("--hours", type=int, default=60, help="of simulated people, an hour each (default: 60)")
+    everyday.add_argument(
+        "--hours",
+        type=number(1, 100_000, whole=True),
+        default=60,
+        help="of simulated people, an hour each (default: 60)",
+    )
     everyday.add_argument("--recordings", **mine, help="instead, hours of your own: tapes of gesturectl record, and "
                           ".npz; where these do not tell what was performed all that is said is false")  # fmt: skip
     everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
@@ -118,9 +129,9 @@ def parser() -> Parser:
     everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
     everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "
                           "anew, such as docs/everyday.md")  # fmt: skip
-    everyday.add_argument("--seed", type=int, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
+    everyday.add_argument("--seed", type=SEED, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
                           f"default's (default: {FIRST_DAY})")  # fmt: skip
-    everyday.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
+    everyday.add_argument("--jobs", type=JOBS, default=2, help="processes (default: 2)")
     stability = add("stability", "measure filters, extreme and stiff inputs through the whole path, and models by "
                     "their answers",
                     "gestured-lab stability --quick")  # fmt: skip
@@ -131,14 +142,19 @@ def parser() -> Parser:
                 "writes its tables, its figures and study.json; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
-    study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")
+    study.add_argument(
+        "--seeds",
+        type=number(1, 100, whole=True),
+        default=3,
+        help="seeds of each figure of the main tables (default: 3)",
+    )
     study.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `study` is written "
                        "anew, such as docs/study.md, with the picture beside it, and others whose block `choice` is, "
                        "such as docs/figures.md")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
-    study.add_argument("--seed", type=number(0, LARGEST_SEED, whole=True), default=0,
+    study.add_argument("--seed", type=SEED, default=0,
                        help="of splits and training: same seed, same numbers (default: 0)")  # fmt: skip
     add_data(study)
     add_recordings(add)
@@ -167,6 +183,8 @@ def _run(args: argparse.Namespace) -> int:
         _check(args)
         status: int = module.run(args)
         return status
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        return 0
     except OSError as error:
         raise GesturedError(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error
     except KeyboardInterrupt:
@@ -176,7 +194,12 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _program(command: str) -> ModuleType:
-    """The module that runs a command; GesturedError where a package of the extra [lab] is missing."""
+    """The module that runs a command; GesturedError where a package of the extra [lab] is missing.
+
+    Ctrl-C waits meanwhile: a library of which half was imported ends in a traceback of its own.
+    """
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
     try:
         return import_module(PROGRAMS[command])
     except ModuleNotFoundError as error:
@@ -184,12 +207,14 @@ def _program(command: str) -> ModuleType:
         if package not in LAB_PACKAGES:
             raise
         raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if asked:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _check(args: argparse.Namespace) -> None:
     """GesturedError for what no command can work with."""
-    if "jobs" in args and args.jobs < 1:
-        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
     if getattr(args, "real", None) is not None and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
     file = getattr(args, flag := FILES.get(args.command, ""), None)

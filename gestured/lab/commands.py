@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 import time
+from contextlib import suppress
 from typing import Any
 
 import torch
@@ -59,7 +60,8 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of
-    say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
+    with suppress(BrokenPipeError):  # what is written goes on without a reader
+        say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
     kept = plain({name: before[name] | of for name, of in figures.items()})  # without --real, what stood there of it
     write_manifest(args.models, kept)
     write_cards(args.models, kept, plan)

@@ -232,9 +232,7 @@ def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--hours", "0"], "--hours: expected 1 or more, found 0"),
         (["--seconds", "0"], "--seconds: expected more than 0, at most 3600, found 0"),
-        (["--jobs", "0"], "--jobs: expected 1 or more, found 0"),
         (["--recordings", "a.npz", "--document", "p.md"], "--document: expected no --recordings"),
         (["--recordings", "nowhere.mcap"], "nowhere.mcap: cannot be read"),
     ],
@@ -292,6 +290,16 @@ def test_a_disk_without_room_for_the_picture_takes_no_figures_away(
     out, err = capsys.readouterr()
     assert "### By gesture" in out and list(tmp_path.iterdir()) == []
     assert err == f"gestured-lab: {tmp_path}/curve.svg: No space left on device\n"
+
+
+def test_a_reader_who_has_gone_takes_no_file_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object, **__: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
+    monkeypatch.setattr(command, "tell", gone)
+    assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 0
+    assert (tmp_path / "curve.svg").exists()
 
 
 def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:

@@ -28,7 +28,6 @@ from gestured.lab.written import write
 from gestured.model.shipped import shipped_name
 from gestured.simulator import GESTURES, NONE
 
-MOST_STEPS = 10_000
 JOBS = 2  # processes that simulate
 WORTH = {
     "people": "Each person was judged by networks that had not learned from that person.",
@@ -52,8 +51,6 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--out: expected a file *.onnx, found {out}")
     if shipped_name(out) is not None:
         raise GesturedError(f"--out: {out} is a shipped model, which stays as it is; give the new one another name")
-    if not 1 <= args.steps <= MOST_STEPS:
-        raise GesturedError(f"--steps: expected 1 to {MOST_STEPS}, found {args.steps}")
     torch.set_num_threads(1)  # networks this small are slower on two, above all where something else computes
     base = base_of(args.base)
     own = own_recordings(args.recordings, args.as_none)

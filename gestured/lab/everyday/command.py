@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from importlib.util import find_spec
@@ -70,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
-    tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
+    with suppress(BrokenPipeError):  # what is written goes on without a reader
+        tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
@@ -85,8 +87,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     """GesturedError for options that do not go together, before anything is played."""
-    if args.hours < 1:
-        raise GesturedError(f"--hours: expected 1 or more, found {args.hours}")
     if args.document and args.recordings:
         raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
     if not 0 < args.seconds <= LONGEST_S:

@@ -15,7 +15,7 @@ from gestured.record.check import SESSION, UNNAMED
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 FOLDER = Path("recordings")
-LARGEST_SEED = 10**9
+SEED = number(0, 10**9, whole=True)
 NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
 IMPORT = """\
 Make recordings of CSV files. What cannot be used is told and
@@ -41,7 +41,7 @@ def add_recordings(command: Add) -> None:
     collect.add_argument(
         "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="its rows and columns (9x9)"
     )
-    collect.add_argument("--seed", type=_seed, default=0, metavar="N", help="another order of the trials (0)")
+    collect.add_argument("--seed", type=SEED, default=0, metavar="N", help="another order of the trials (0)")
     collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B",
                          help="only these, or names of your own (all ten)")  # fmt: skip
     collect.add_argument("--non-gestures", type=some_of(NON_GESTURES), metavar="A,B",
@@ -104,6 +104,5 @@ def _day(text: str) -> str:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a day such as 2026-01-31") from None
 
 
-_seed = number(0, LARGEST_SEED, whole=True)
 _count = number(1, 100, whole=True)
 _seconds = number(0, 60, whole=True)

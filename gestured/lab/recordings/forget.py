@@ -19,7 +19,7 @@ FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 
 
 def run(args: argparse.Namespace) -> int:
-    """Say what would go, ask, and let it go. Exit status 1 where a file could not be looked into."""
+    """Say what would go, ask, and let it go. Exit status 1 where a file could not be looked into, or stays."""
     name, unread = args.participant, []
     found: dict[Path, tuple[int, int]] = {}  # how many recordings are the participant's, and how many there are
     for file in _files(args.paths):
@@ -38,22 +38,34 @@ def run(args: argparse.Namespace) -> int:
     lines = lines or [f"no recording of {name} was found"]
     lines += [f"not looked into: {reason}" for reason in unread]
     lines += [f"model {model}: {answer}" for model, answer in models.items()]
+    lines += [] if models else [f"no model to ask: {args.models} holds no *.onnx"]
     for line in lines:
         say(line, to=sys.stderr if args.json else sys.stdout)
     done = bool(found) and not args.dry_run and (args.yes or _agreed(name))
+    stay = []
     for file in found if done else ():
-        recordings = read(file)
-        others = np.flatnonzero(recordings.subjects.astype(str) != name)
-        if len(others):
-            write(file, recordings.take(others))
-        else:
-            file.unlink()
+        try:
+            _remove(file, name)
+        except (RecordingError, OSError) as error:  # the others go nevertheless
+            stay.append(str(error) if isinstance(error, RecordingError) else f"{file}: {error.strerror}")
+            say(f"not removed: {stay[-1]}", to=sys.stderr)
     if args.json:
         files = [{"file": str(file), "recordings": own, "of": every} for file, (own, every) in found.items()]
-        say_json({"participant": name, "removed": done, "files": files, "not_looked_into": unread, "models": models})
+        told = {"participant": name, "removed": done, "files": files, "not_removed": stay, "not_looked_into": unread}
+        say_json(told | {"models": models})
     else:
-        say("removed; not looked for: copies, backups, caches and reports" if done else "nothing was removed")
-    return 1 if unread else 0
+        rest = "the rest is removed" if stay else "removed"
+        say(f"{rest}; not looked for: copies, backups, caches and reports" if done else "nothing was removed")
+    return 1 if unread or stay else 0
+
+
+def _remove(file: Path, participant: str) -> None:
+    recordings = read(file)
+    others = np.flatnonzero(recordings.subjects.astype(str) != participant)
+    if len(others):
+        write(file, recordings.take(others))
+    else:
+        file.unlink()
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:

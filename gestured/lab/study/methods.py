@@ -154,7 +154,7 @@ def _net(
     given = {"units": 32, "rate": rates[0], "steps": TRAINING_STEPS, **channels}
 
     def make(classes: int, values: Values) -> nn.Module:
-        return SequenceNet(kind, values["units"], classes, values.get("channels", 16))
+        return SequenceNet(kind, values["units"], classes, values.get("channels", 0))
 
     return Method(
         kind, title, FRAMES, partial(_train, make), tuple(grid),

@@ -47,7 +47,6 @@ class Task:
     folds: int
     length: float = LENGTH  # of all windows in the paper's protocol: this quantile of the gestures' lengths
     box: float = THRESHOLD  # of the peak: what is in Algorithm 1's bounding box
-    average: int = AVERAGE_FRAMES  # frames of the running average in the paper's protocol; 1: none
 
 
 def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
@@ -60,7 +59,7 @@ def _form(task: Task, data: Data) -> Form:
     if task.protocol not in LEAKY:
         return Form()
     share = 1.0 if task.protocol == PADDED else task.length
-    return Form(int(np.quantile(data.gestures.lengths(), share)), task.average)
+    return Form(int(np.quantile(data.gestures.lengths(), share)), AVERAGE_FRAMES)
 
 
 @lru_cache(maxsize=6)
@@ -109,12 +108,10 @@ def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -
 def run(task: Task, data: Data) -> Result:
     """Every judged gesture of a cell: whose it was, what it was, and what it was called.
 
-    `same` and `version` (protocols that augment before they split): whether the very same window, and whether any
-        shifted version of the same gesture, was learned from.
+    `same` (protocols that augment before they split): whether the very same window was learned from.
     """
     of, inputs = material(task, data)
-    found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "fold")}
-    seen: dict[str, list[bool]] = {"same": [], "version": []}
+    found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "fold", "same")}
     taught, seconds = 0, 0.0
     for fold, (train, test) in enumerate(splits(task, of)):
         start = time.perf_counter()
@@ -129,7 +126,6 @@ def run(task: Task, data: Data) -> Result:
         found["fold"] += [fold] * len(test)
         if task.protocol in LEAKY and task.augmentation == SHIFT:
             itself = of.source[train][of.same[train]]  # gestures that are learned from as they are
-            seen["same"] += (of.same[test] & np.isin(of.source[test], itself)).tolist()
-            seen["version"] += np.isin(of.source[test], of.source[train]).tolist()
+            found["same"] += (of.same[test] & np.isin(of.source[test], itself)).tolist()
     folds = found["fold"][-1] + 1
-    return {**found, **seen, "train": taught // folds, "seconds": round(seconds, 3)}
+    return {**found, "train": taught // folds, "seconds": round(seconds, 3)}

@@ -7,6 +7,7 @@ play the same sessions for comparison (`shipped`). Each session is another perso
 """
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -67,20 +68,18 @@ def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def online(
-    plan: Plan, tuned: dict[str, Values], data: Data, folder: Path
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def online(plan: Plan, tuned: dict[str, Values], data: Data) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """The study's models, and the shipped ones."""
     if not plan.minutes:
         return [], []
     sessions = list(takes(plan.minutes, FIRST_PERSON))
-    folder.mkdir(parents=True, exist_ok=True)
     ours, shipped = [], []
     for name in ("tp_rf", "lstm", "cnn_lstm"):
-        path = folder / f"{name}.onnx"
-        export(name, tuned[name], data, plan.seed, path)
         published = METHODS[name].published_online
-        ours.append({"method": name, **score(str(path), sessions, f"sessions, {name}"), "published": published})
+        with TemporaryDirectory() as folder:
+            path = Path(folder, f"{name}.onnx")
+            export(name, tuned[name], data, plan.seed, path)
+            ours.append({"method": name, **score(str(path), sessions, f"sessions, {name}"), "published": published})
         theirs = score(SHIPPED[name], sessions, f"sessions, shipped {name}")
         shipped.append({"method": name, **theirs, "published": published})
     return ours, shipped

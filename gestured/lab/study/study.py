@@ -16,7 +16,6 @@ import torch
 
 import gestured
 from gestured.client.say import say_drawn
-from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.study import cohort, tables
@@ -43,8 +42,6 @@ PAPER_CITED = (
 def run(args: argparse.Namespace) -> int:
     """`gestured-lab study`."""
     torch.set_num_threads(1)
-    if args.seeds < 1:
-        raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
     require_marks("study", *(args.document or ())[:1])
     require_marks("choice", *(args.document or ())[1:])
     args.out.mkdir(parents=True, exist_ok=True)
@@ -123,7 +120,7 @@ def played(plan: Plan, tuned: dict[str, Values], data: Data, schedule: Schedule)
     """The online protocol's rows: of the study's models, and of the shipped ones."""
     key = [data.key, asdict(plan), tuned, [file_digest(path) for path in shipped().values()]]
     made: list[list[dict[str, Any]]] = schedule.once(
-        "online", online.__module__, key, lambda: online(plan, tuned, data, schedule.cache / "models")
+        "online", online.__module__, key, lambda: online(plan, tuned, data)
     )
     return made
 

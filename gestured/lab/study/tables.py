@@ -168,9 +168,8 @@ def _spread(shares: Sequence[float]) -> float:
 def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
     """How much of the gain by augmentation comes from copies of test gestures in the training set.
 
-    `with_copy` counts test gestures, of all seeds, whose very same window is learned from too (a shift of zero),
-    `with_version` those of which any other version is. The gains are of augmentation under the paper's protocol and
-    under the clean one.
+    `with_copy` counts test gestures, of all seeds, whose very same window is learned from too (a shift of zero). The
+    gains are of augmentation under the paper's protocol and under the clean one.
     """
     out = []
     for cell, result in found.items():
@@ -183,7 +182,7 @@ def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
         good, same = right(result), np.array(result["same"])
         out.append({
             "method": cell.method, "settings": cell.settings, "test": len(good),
-            "with_copy": int(same.sum()), "with_version": int(np.sum(result["version"])),
+            "with_copy": int(same.sum()),
             "right_with_copy": _mean(good[same]), "right_without_copy": _mean(good[~same]),
             "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, UNCHANGED), 4),
             "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, UNCHANGED), 4),

@@ -1,5 +1,6 @@
 """`gestured-lab forget`: whoever is forgotten is gone, everybody else is untouched, and models are asked."""
 
+import errno
 import json
 import sys
 from dataclasses import replace
@@ -128,6 +129,21 @@ def test_what_cannot_be_looked_into_or_kept_whole_is_told(tmp_path: Path, capsys
     assert f"not looked into: {extra}: temperature.npy: is no field" in out
     assert extra.read_bytes() == before
     assert not (path / "07.npz").exists()  # what can be removed is
+
+
+def test_a_file_that_cannot_be_removed_is_told_and_keeps_no_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = folder(tmp_path)
+
+    def refused(file: Path) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(file))
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    status, out, err = run(capsys, "07", path, "--yes", "--models", "nowhere")
+    assert (status, err) == (1, f"not removed: {path / '07.npz'}: Permission denied\n")
+    assert "the rest is removed; not looked for" in out and "no model to ask: nowhere holds no *.onnx" in out
+    assert read(path / "both.npz").subjects.tolist() == ["08"]
 
 
 def test_without_onnx_models_cannot_be_asked_and_recordings_go(

@@ -94,7 +94,7 @@ def _trials(method: str) -> Study:
 
 def _copies(method: str) -> Study:
     return {
-        "method": method, "settings": "paper", "test": 1836, "with_copy": 930, "with_version": 1800,
+        "method": method, "settings": "paper", "test": 1836, "with_copy": 930,
         "right_with_copy": 0.99, "right_without_copy": 0.71, "gain_leaky": 0.2, "gain_clean": 0.02,
     }  # fmt: skip
 

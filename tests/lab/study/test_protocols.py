@@ -30,7 +30,6 @@ def task(protocol: str, augmentation: str = SHIFT, method: str = "tp_knn") -> Ta
 
 def test_the_papers_split_learns_from_copies_of_what_it_judges() -> None:
     found = run(task(PAPER), data())
-    assert np.mean(found["version"]) > 0.9
     assert 0 < np.sum(found["same"]) < len(found["same"])
     assert np.mean(np.array(found["predicted"]) == found["truth"]) > 0.5
 
