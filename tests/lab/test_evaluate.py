@@ -132,7 +132,12 @@ def test_without_real_recordings_their_figures_stay_of_the_same_files_and_no_net
     monkeypatch.setattr(commands, "simulated_figures", lambda *_: dict.fromkeys(LADDER, {"wide": share(0.5)}))
     for module in (commands, evaluate):
         monkeypatch.setattr(module, "learn", lambda *_: pytest.fail("learns what nothing asks for"), raising=False)
-    assert main(["evaluate", "--models", str(tmp_path), "--cache", str(tmp_path / "cache")]) == 0
+    line = ["evaluate", "--models", str(tmp_path), "--cache", str(tmp_path / "cache")]
+    stood = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main([*line, "--quick"]) == 0
+    assert "cards and manifest stay as they are" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == stood
+    assert main(line) == 0
     assert (
         "left out, since no --real FOLDER was named; their figures of the same models stay" in capsys.readouterr().err
     )
