@@ -3,7 +3,6 @@
 import argparse
 import io
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -11,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gestured.client.program import Parser, program, run
+from gestured.client.program import Parser, on_stop, program, run, stop_as_by_ctrl_c
 from gestured.client.say import say
 from gestured.client.values import number
 from gestured.core.errors import GesturedError
@@ -196,10 +195,11 @@ def _run(args: argparse.Namespace) -> int:
 def _program(command: str) -> ModuleType:
     """The module that runs a command; GesturedError where a package of the extra [lab] is missing.
 
-    Ctrl-C waits meanwhile: a library of which half was imported ends in a traceback of its own.
+    Whoever asks for the end, as by Ctrl-C, waits meanwhile: a library of which half was imported ends in a traceback of
+    its own. SIGTERM alone would leave the processes behind that --jobs starts.
     """
-    asked: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    asked: list[bool] = []
+    on_stop(lambda: asked.append(True))
     try:
         return import_module(PROGRAMS[command])
     except ModuleNotFoundError as error:
@@ -208,9 +208,9 @@ def _program(command: str) -> ModuleType:
             raise
         raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
     finally:
-        signal.signal(signal.SIGINT, before)
+        stop_as_by_ctrl_c()
         if asked:
-            signal.raise_signal(signal.SIGINT)
+            raise KeyboardInterrupt
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -8,7 +8,8 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -189,17 +190,42 @@ def test_a_reader_who_has_gone_ends_a_command_as_by_head(
     assert capsys.readouterr() == ("", "")
 
 
-def test_an_interruption_waits_for_imports(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def _usual_signals() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_usual_signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_whoever_asks_for_the_end_waits_for_imports(
+    number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     imported = []
 
     def importing(_: str) -> argparse.Namespace:
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), number)
         imported.append("whole")
         return argparse.Namespace(run=lambda _: 0)
 
     monkeypatch.setattr("gestured.lab.cli.import_module", importing)
     assert main(["everyday"]) == 130
     assert imported == ["whole"] and capsys.readouterr().err == "\ngestured-lab: interrupted\n"
+
+
+@pytest.mark.usefixtures("lab")
+def test_sigterm_ends_the_processes_that_were_started_too(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gestured.lab", "everyday", "--hours", "4", "--jobs", "2"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as lab:
+        children = Path(f"/proc/{lab.pid}/task/{lab.pid}/children")
+        while len(started := children.read_text().split()) < 3:  # the pool's two, and one that looks after both
+            time.sleep(0.05)
+        lab.terminate()
+        assert lab.communicate(timeout=60)[1] == "\ngestured-lab: interrupted\n"
+    assert lab.returncode == 130
+    assert not [number for number in started[1:] if Path(f"/proc/{number}").exists()]
 
 
 @pytest.mark.usefixtures("lab")
