@@ -47,7 +47,7 @@ pip() {  # pip ARGUMENT...: install with the pip of VENV
 touch "$work/before"
 if [ -e "$root$lib/installed" ]; then cp "$root$lib/installed" "$work/before"; fi
 rm -rf "$new" "$old"
-mkdir -p "$new"  # said now where it may not be made, and not after minutes
+mkdir -p "$new"  # a folder that may not be made is told now, and not after minutes of pip
 if [ -n "${WHEELS-}" ]; then
     # shellcheck disable=SC2046,SC2086 # one argument for each wheel; a name of a wheel has no blanks
     pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM $(echo "$WHEELS"/*.whl)

@@ -67,7 +67,7 @@ class Daemon:
         match line["type"]:
             case "hello":
                 self.hello, self.version = line, line["version"]
-                self._lags.clear()  # a daemon that starts again follows each sensor's clock from its arrival on
+                self._lags.clear()  # a restarted daemon takes each sensor's clock anew
                 self._gestures(line["gestures"])
                 self.listening = dict(line.get("gates", {}))
                 self._heard({name: self.states.get(name, "no_data") for name in line["sensors"]})

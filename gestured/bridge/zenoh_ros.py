@@ -25,7 +25,7 @@ STRING = "std_msgs::msg::dds_::String_"  # std_msgs/String, and below the hash o
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 # Quality of service as rmw_zenoh writes it: what differs from its default (reliable, volatile, the last 42).
 LAST_TEN, LATEST = "::,10:,:,:,,", ":1:,1:,:,:,,"
-HEARTBEAT_S = 0.5  # after which who missed the latest message learns of it, as with rmw_zenoh
+HEARTBEAT_S = 0.5  # after which a listener that missed the latest status learns of it; rmw_zenoh has the same
 MOST_DOMAIN = 232  # the largest ROS_DOMAIN_ID
 
 
@@ -51,7 +51,7 @@ class Ros(Zenoh):
                 self._put({**self._status, "sensor": ""}, self._daemon.payload(self._status))
 
     def _serve(self, session: Any) -> None:
-        """Nothing: ROS asks for no more than its topics."""
+        """Answer no questions: nodes of ROS 2 subscribe to topics, and ask for nothing else."""
 
     def _announce(self) -> None:
         """Announce the node and its topics: those of a sensor before its first event, so that it has listeners then."""
@@ -61,7 +61,7 @@ class Ros(Zenoh):
         for sensor in self._daemon.states:
             for kind in self._types:
                 self._topic(sensor, kind)
-        if len(self._topics) > MOST_SENSORS:  # whoever can send frames can invent names
+        if len(self._topics) > MOST_SENSORS:  # whoever can send frames can invent names of sensors
             for sensor, kind in [key for key in self._topics if key[0] and key[0] not in self._daemon.states]:
                 self._topics.pop((sensor, kind)).close()
 
@@ -105,7 +105,7 @@ class _Topic:
         else:
             self._publisher = session.declare_publisher(key, reliability=zenoh.Reliability.RELIABLE)
         self._token = session.liveliness().declare_token(entity)
-        # rmw_zenoh takes XXH3 of the token, which Python does not have. Any 16 bytes tell publishers apart.
+        # A publisher's identity may be any 16 bytes that no other has; rmw_zenoh takes XXH3, which Python lacks.
         self._identity = hashlib.blake2b(entity.encode(), digest_size=16).digest()
         self._count = 0
 
@@ -128,7 +128,7 @@ def _gone() -> Line:
 
 
 def _domain(text: str) -> int:
-    """The domain of the nodes that shall hear us. Raises BridgeError."""
+    """The number of the ROS domain that ROS_DOMAIN_ID names. Raises BridgeError."""
     if not (text.isascii() and text.isdigit() and len(text) <= 3 and int(text) <= MOST_DOMAIN):
         raise BridgeError(f"ROS_DOMAIN_ID={text}: expected a number from 0 to {MOST_DOMAIN}")
     return int(text)

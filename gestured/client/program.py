@@ -60,7 +60,7 @@ def on_stop(act: Callable[[], object]) -> None:
         asks.append(signal.SIGHUP)
     for number in asks:
         signal.signal(number, lambda *_: act())
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, asks)  # whoever started us may have blocked them
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, asks)  # a process inherits blocked signals from its parent
 
 
 def stop_as_by_ctrl_c() -> None:

@@ -34,7 +34,7 @@ DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
-BEGUN_S = 5.0  # in which the simulated sensor has surely sent something, unless it fails
+BEGUN_S = 5.0  # how long the pad waits at most for the simulated sensor to send first
 GONE_S = 3.0  # without a page a pad counts as closed: a page that is loaded again comes back within that time
 HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
 
@@ -61,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     take = performance(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
-    with Engine(args.model, rows, columns, "--flight-recorder", "4", "--touch", "true") as engine:  # for its page
+    flags = ("--flight-recorder", "4", "--touch", "true")  # so that its page can flag answers and move sliders
+    with Engine(args.model, rows, columns, *flags) as engine:
         control = Path(engine.ready["control"])
         try:
             with (

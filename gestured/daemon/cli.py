@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: sys.exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    # Whoever starts us may have blocked them, and a child has its starter's mask.
+    # A process inherits its parent's signal mask, in which these signals may be blocked.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGHUP})
     given: dict[str, Any] = vars(parser().parse_args(arguments))
     explain = given.pop("explain")

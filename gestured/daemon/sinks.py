@@ -76,7 +76,7 @@ class UdpOut(Sink):
                 if self._found is not None:
                     self._connect(*self._found)
                 if self._socket is None:
-                    self._lost("unresolved")  # the network, or who knows names in it, comes later than we do
+                    self._lost("unresolved")  # the network or its name server may come up later
                     return
                 self._socket.send(packet)
                 self._metrics.sent.add("sent")
@@ -87,7 +87,7 @@ class UdpOut(Sink):
                 self._failed("full")
                 return
             except OSError:
-                self._lost("unreachable")  # the network may have changed, and with it its address or ours
+                self._lost("unreachable")  # after a change of network, either address may be new
                 return
 
     def _connect(self, family: int, where: Any) -> None:

@@ -62,10 +62,10 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
         figures[name]["real"] = of
     with suppress(BrokenPipeError):  # what is written goes on without a reader
         say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
-    if args.quick and args.command == "evaluate":  # a card says how its model was trained, which was not quickly
-        say("cards and manifest stay as they are, since --quick asks few", to=sys.stderr)
+    if args.quick and args.command == "evaluate":  # a card describes the plan that trained its model
+        say("cards and manifest stay as they are: --quick judges too few gestures for them", to=sys.stderr)
     else:
-        kept = plain({name: before[name] | of for name, of in figures.items()})  # without --real, what stood there
+        kept = plain({name: before[name] | of for name, of in figures.items()})  # real figures stay where none are new
         write_manifest(args.models, kept)
         write_cards(args.models, kept, plan)
     if args.document:

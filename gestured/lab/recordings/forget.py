@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     for file in found if done else ():
         try:
             _remove(file, name)
-        except (RecordingError, OSError) as error:  # the others go nevertheless
+        except (RecordingError, OSError) as error:  # a file that stays does not keep the others
             stay.append(str(error) if isinstance(error, RecordingError) else f"{file}: {error.strerror}")
             say(f"not removed: {stay[-1]}", to=sys.stderr)
     if args.json:
