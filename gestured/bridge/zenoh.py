@@ -28,7 +28,7 @@ def add(commands: Commands) -> None:
     """Add the bridge to the command line."""
     parser = commands.add_parser(
         "zenoh",
-        help="events to Zenoh, and frames from there",
+        help="events to Zenoh, or to nodes of ROS 2 that use it; frames from Zenoh",
         description="Publish events under gestured/SITE/SENSOR/TYPE, with liveliness tokens for daemon and sensors.",
         epilog="examples:\n  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
         "  gestured-bridge zenoh --frames --to 127.0.0.1:9000\n"
@@ -43,7 +43,8 @@ def add(commands: Commands) -> None:
     add_filters(parser)
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")
-    text = "events as topics of ROS 2, for nodes with rmw_zenoh; --site is the namespace (default: none)"
+    text = "instead of keys of Zenoh's own, topics of ROS 2 for nodes with rmw_zenoh, in the domain that the variable "
+    text += "ROS_DOMAIN_ID names (default: 0); --site is the namespace (default: none)"
     either.add_argument("--ros2", action="store_true", help=text)
     add_destination(parser)
     add_metrics(parser)
