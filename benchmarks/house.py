@@ -6,6 +6,7 @@ packet of 81 floats of a settled sensor that nobody touches, in a scene with not
 """
 
 import ast
+import signal
 import statistics
 import sys
 from collections.abc import Iterator
@@ -102,4 +103,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends it without a traceback
     main()

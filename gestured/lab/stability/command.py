@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 
 from gestured.client.say import say_drawn
@@ -36,7 +37,8 @@ def run(args: argparse.Namespace) -> int:
         table = make(args.quick)
         done.append(asdict(table))
         if not args.json:
-            say_drawn(str(table))
+            with suppress(BrokenPipeError):  # the page is written without a reader, too
+                say_drawn(str(table))
         if args.document:
             code = WITHOUT_MODELS.get(name)
             made = made_of(args.words, [], code) if code else made_of(args.words, shipped().values())
