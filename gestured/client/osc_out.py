@@ -3,20 +3,16 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from struct import Struct
-from typing import Any
 
-import numpy as np
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 HEADS = 1024  # heads of messages that are remembered; a sensor has one or two
-ANEW_S = 2_085_978_496  # s since 1970, in 2036, when a time tag's 32 bits of seconds begin anew
-AGAIN_S = 2**32  # from one beginning of a time tag's seconds to the next
-NOT_ZERO_S = 2.0**-32  # in place of 0: so little that the time tag is that of 1970 all the same
+FROM_1900_S = 2_208_988_800  # to 1970: a time tag counts from 1900, in units of 2**-32 s
 
-_size = Struct(">i").pack
+_size, _tag = Struct(">i").pack, Struct(">Q").pack
 
 
 def message(address: str, types: str, args: Sequence[int | float | str | bytes]) -> OscMessage:
@@ -41,11 +37,8 @@ def dated(moment: float, *elements: bytes) -> bytes:
     The elements are taken as they are: python-osc parses what a bundle is given, which would take longer than all else
     for a frame, and raise for what a tape has of a sensor that sends nonsense.
     """
-    # A float64 holds a time since 1900 to half a microsecond only, a longdouble to the time tag's own resolution.
-    since_1970 = (np.longdouble(moment) - ANEW_S) % AGAIN_S + (ANEW_S - AGAIN_S)
-    seconds: Any = since_1970 or NOT_ZERO_S  # python-osc takes 0 for "immediately"
-    empty = OscBundleBuilder(seconds).build().dgram
-    return b"".join((empty, *(part for element in elements for part in (_size(len(element)), element))))
+    since_1900 = (round(moment * 2**32) + (FROM_1900_S << 32)) % 2**64  # in 2036 the count begins anew
+    return b"".join((b"#bundle\0", _tag(since_1900), *(part for one in elements for part in (_size(len(one)), one))))
 
 
 @lru_cache(HEADS)
