@@ -4,7 +4,6 @@ import ast
 import json
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
 from hypothesis import example as such_as
@@ -15,8 +14,7 @@ from gestured.client.say import MOST, shown
 from gestured.control.proposal import propose
 from gestured.core.address import is_sensor
 from gestured.core.wire import Addresses
-from gestured.record import tape_reader, tape_writer
-from tests.control.conftest import ROOT, gestures
+from tests.control.conftest import ROOT
 from tests.control.test_sniff import seen
 from tests.daemon.harness import Hand, floats
 from tests.sockets import GESTURE, HELLO, FakeDaemon
@@ -191,22 +189,3 @@ def test_what_it_publishes_is_shown(told, fake: FakeDaemon, more) -> None:
         assert json.loads(lines[-1])["sensor"] == "\x9b2J\u202e\x7f"
     else:
         assert len(lines) == len(EVENTS) + 1
-
-
-# Files
-
-
-def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
-    path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
-    found = tape_reader.read(path)
-    with tape_writer.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:
-        for packet in found.packets:
-            writer.packet(packet.t_ns, f"{packet.source[0]}:{packet.source[1]}", packet.data)
-        for event in found.events:
-            changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
-            writer.event(found.packets[-1].t_ns, dict(event) | changed)
-    for more in ([], ["--json"]):
-        model = found.scene["settings"]["model"]
-        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
-        assert status == 1 and "owned" in out, err
-        plain(out + err)

@@ -123,9 +123,9 @@ def test_ctrl_c_and_a_reader_that_leaves_end_it_without_a_word(start, fake: Fake
         assert b"Traceback" not in process.stderr.read()
 
 
-def test_the_wrong_one_of_two_sockets_is_said(daemon, run, monkeypatch):
-    status, _, err = run("emit", "swipe_left", "--control", daemon.socket)
-    assert status == 1 and f"{daemon.socket} is not the control socket" in err
+def test_the_wrong_one_of_two_sockets_is_said(told, fake: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    status, _, err = told([HELLO], "emit", "swipe_left", "--control", fake.path)  # it greets: so do event sockets
+    assert status == 1 and f"{fake.path} is not the control socket" in err
     monkeypatch.setattr("gestured.client.subscriber.GREETING_S", 0.2)
     with pytest.raises(Unreachable, match="not its event socket"):
-        next(Subscriber(daemon.ready["control"], reconnect=False))
+        next(Subscriber(fake.path, reconnect=False))  # it says nothing: so do control sockets

@@ -1,10 +1,7 @@
 """Answers on a control socket that no daemon of this version gives: one sentence, and no traceback."""
 
-import os
-import signal
 from collections.abc import Callable
 from pathlib import Path
-from threading import Thread
 
 import pytest
 
@@ -47,22 +44,3 @@ def test_a_tap_without_what_is_kept_ends_the_recording(
     status, out, err = told(said, "record", tmp_path / "x.mcap", "--control", fake.path)
     assert (status, out) == (1, "")
     assert "says something that gestured " in err and "Traceback" not in err
-
-
-@pytest.mark.parametrize("command", ["record", "record --seconds 0.2", "sniff", "sniff --seconds 0.2"])
-def test_what_a_daemon_that_hangs_streams_can_be_ended(run, daemon, fake, monkeypatch, command: str) -> None:
-    monkeypatch.setattr("gestured.control.address.LAST_S", 0.1)
-    scene = daemon.ask("tap")
-
-    def hang() -> None:
-        fake.accept(scene)
-        fake.request()
-        if "--seconds" not in command:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    serving = Thread(target=hang)
-    serving.start()
-    files = [fake.path.with_suffix(".mcap")] if "record" in command else []
-    status, out, _ = run(*command.split(), *files, "--control", fake.path)
-    serving.join()
-    assert (status, "0 packets" in out) == (int("sniff" in command), True)

@@ -1,7 +1,9 @@
 """gesturectl's questions to a real daemon: status, doctor, sniff, emit, reload, recalibrate."""
 
 import json
+import os
 import re
+import signal
 import socket
 import threading
 from pathlib import Path
@@ -119,6 +121,25 @@ def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daem
     message = next(m for m in found["messages"] if m["address"] == "/textile/odd/matrix")
     assert (message["types"], message["count"], len(message["sources"])) == ("f*81", 20, 1)
     assert found["errors"] == {"not_osc": 1}
+
+
+@pytest.mark.parametrize("command", ["record", "record --seconds 0.2", "sniff", "sniff --seconds 0.2"])
+def test_what_a_daemon_that_hangs_streams_can_be_ended(run, daemon, fake, monkeypatch, command: str) -> None:
+    monkeypatch.setattr("gestured.control.address.LAST_S", 0.1)
+    scene = daemon.ask("tap")
+
+    def hang() -> None:
+        fake.accept(scene)
+        fake.request()
+        if "--seconds" not in command:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    serving = threading.Thread(target=hang)
+    serving.start()
+    files = [fake.path.with_suffix(".mcap")] if "record" in command else []
+    status, out, _ = run(*command.split(), *files, "--control", fake.path)
+    serving.join()
+    assert (status, "0 packets" in out) == (int("sniff" in command), True)
 
 
 def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> None:

@@ -14,9 +14,8 @@ from gestured.model.shipped import shipped
 from gestured.record import arrays as recording
 from gestured.record import tape_reader
 from gestured.record.recordings import Recordings
-from tests.control.conftest import gestures
 from tests.daemon import tiny_model
-from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor
+from tests.daemon.harness import RATE_HZ, Frame, Hand, Sensor
 from tests.hostile.grammar import violations
 from tests.sockets import free_address
 
@@ -32,18 +31,6 @@ def replay(run):
 def said(out: str) -> list[str]:
     """Sign and answer of each line of differences."""
     return [line[0] + line.rpartition(": ")[2].split()[0] for line in out.splitlines()]
-
-
-def test_a_daemon_to_which_it_is_sent_answers_as_the_recorded_one_did(recorded, replay, daemon: Daemon, serve) -> None:
-    path, _ = recorded(gestures(daemon, "cmp", "left", "tap", "up"))
-    other = serve("--clock", "sensor")
-    client = other.client().subscribe("gesture", "status")
-    for _ in range(2):  # the second time it knows the sensor, whose clock is far ahead
-        status, out, err = replay(path, "--to", other.ready["listen"], "--speed", 50)
-        assert (status, out) == (0, "") and err.startswith("sent ")
-        answers = client.events("gesture", "cmp", 3)
-        assert [event["gesture"] for event in answers] == ["swipe_left", "one_tap", "swipe_up"]
-        client.until(lambda line: line.get("sensors", {}).get("cmp") == "stale")  # free for another source
 
 
 def labelled(path: Path, *performed: tuple[str, list[Frame]], lead_s: float = LEAD_S) -> Path:

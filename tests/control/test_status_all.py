@@ -1,22 +1,24 @@
 """gesturectl status --all: each daemon that runs, a line each."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
 from gestured.client import address
 from gestured.control import status as status_command
+from gestured.control.cli import main
 from gestured.daemon.sockets import UnixListener
 from tests.daemon.harness import Daemon
 
 
-def test_each_daemon_that_runs_is_shown_wherever_its_socket_is(run, serve) -> None:
-    daemons: list[Daemon] = [serve(), serve()]
+def test_each_daemon_that_runs_is_shown_wherever_its_socket_is(run, daemon: Daemon, serve) -> None:
+    daemons: list[Daemon] = [daemon, serve()]
     status, out, _ = run("status", "--all", "--json")
     found = {line["control"]: line["pid"] for line in map(json.loads, out.splitlines()) if "pid" in line}
     assert {daemon.ready["control"]: daemon.process.pid for daemon in daemons}.items() <= found.items()
-    (line,) = [line for line in run("status", "--all")[1].splitlines() if line.startswith(daemons[0].ready["control"])]
+    (line,) = [line for line in run("status", "--all")[1].splitlines() if line.startswith(daemons[1].ready["control"])]
     assert line.split()[1] == "no_data"
 
 
@@ -31,6 +33,9 @@ def test_all_are_watched_until_ctrl_c(run, daemon: Daemon, monkeypatch: pytest.M
     status, out, _ = run("status", "--all", "--watch", "--json")
     told = [json.loads(line)["control"] for line in out.splitlines()]
     assert (status, told.count(daemon.ready["control"])) == (0, 3)
+    pauses = iter(range(2))
+    monkeypatch.setattr(sys, "stdout", None)  # as an output that is closed: nobody can ask whether it is a terminal
+    assert main(["status", "--all", "--watch"]) == 0 and not list(pauses)
 
 
 def test_one_that_does_not_answer_and_none_at_all_are_said(

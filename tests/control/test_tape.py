@@ -15,6 +15,7 @@ from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import gestures
+from tests.control.test_foreign_text import HOSTILE, plain
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 
@@ -64,6 +65,35 @@ def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, t
     }  # fmt: skip
     status, out, _ = run("replay", path, "--diff", "--model", other, "--json")
     assert [json.loads(line)["replayed"]["answer"] for line in out.splitlines()] == ["one_tap", "swipe_left"]
+
+
+def test_a_daemon_to_which_it_is_sent_answers_as_the_recorded_one_did(recorded, run, daemon: Daemon, serve) -> None:
+    path, _ = recorded(gestures(daemon, "cmp", "left", "tap", "up"))
+    other = serve("--clock", "sensor")
+    client = other.client().subscribe("gesture", "status")
+    for again in (False, True):  # the second time it knows the sensor, whose clock is far ahead
+        if again:  # the sensor is free for another source
+            client.until(lambda line: line.get("sensors", {}).get("cmp") == "stale")
+        status, out, err = run("replay", path, "--to", other.ready["listen"], "--speed", 50)
+        assert (status, out) == (0, "") and err.startswith("sent ")
+        answers = client.events("gesture", "cmp", 3)
+        assert [event["gesture"] for event in answers] == ["swipe_left", "one_tap", "swipe_up"]
+
+
+def test_foreign_names_in_a_recording_are_shown_and_not_obeyed(recorded, run, daemon, tmp_path: Path) -> None:
+    path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
+    found = tape_reader.read(path)
+    with tape_writer.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:
+        for packet in found.packets:
+            writer.packet(packet.t_ns, f"{packet.source[0]}:{packet.source[1]}", packet.data)
+        for event in found.events:
+            changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
+            writer.event(found.packets[-1].t_ns, dict(event) | changed)
+    for more in ([], ["--json"]):
+        model = found.scene["settings"]["model"]
+        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
+        assert status == 1 and "owned" in out, err
+        plain(out + err)
 
 
 def test_a_killed_recorder_leaves_what_was_flushed(start, daemon: Daemon, tmp_path: Path) -> None:
