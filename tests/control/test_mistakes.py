@@ -3,7 +3,6 @@
 import json
 import socket
 import time
-from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -51,18 +50,6 @@ def test_the_variables_that_the_daemon_takes_find_it(run, daemon: Daemon, tmp_pa
         assert status == 0, (given, err)
 
 
-@pytest.fixture
-def own(serve, tmp_path: Path) -> Callable[..., Daemon]:
-    """Starts a daemon with this configuration file, which the test alone uses."""
-
-    def begin(config: str = "", *flags: object) -> Daemon:
-        path = tmp_path / "gestured.toml"
-        path.write_text(config)
-        return serve("--config", path, *flags)
-
-    return begin
-
-
 def awaited(daemon: Daemon, name: str, *states: str) -> dict[str, Any]:
     """A sensor's part of the status, once its state is one of these."""
     end = time.monotonic() + DEADLINE_S
@@ -79,22 +66,20 @@ def of(sensor: str, doctor: str) -> list[dict[str, str]]:
     return [finding for finding in findings if finding["what"].startswith(f"sensor {sensor}:")]
 
 
-def test_counts_that_fall_when_touched(run, own) -> None:
+def test_counts_that_fall_when_touched(ctl, daemon: Daemon) -> None:
     def falling(address: str, frame, count: int) -> bytes:
         return floats(address, 300 - frame, count)
 
-    daemon = own("", "--clock", "sensor", "--stale-s", 30)
-    Sensor(daemon, "arm", falling).begin().perform("left", "right", "up", "down")
-    awaited(daemon, "arm", "inverted")
-    control = ("--control", daemon.ready["control"])
-    assert " inverted " in run("status", *control)[1]
-    status, out, _ = run("doctor", *control, "--json")
-    (found,) = of("arm", out)
-    assert status == 1 and "counts fall" in found["what"] and "[sensors.arm] invert = true" in found["remedy"]
+    Sensor(daemon, "falls", falling).begin().perform("left", "right", "up", "down")
+    awaited(daemon, "falls", "inverted")
+    assert " inverted " in ctl("status")[1]
+    status, out, _ = ctl("doctor", "--json")
+    (found,) = of("falls", out)
+    assert status == 1 and "counts fall" in found["what"] and "[sensors.falls] invert = true" in found["remedy"]
 
 
-def test_a_sensor_that_sends_only_while_it_is_touched(run, own) -> None:
-    daemon = own("", "--clock", "sensor", "--stale-s", 0.2)  # its rate is not that of the burst which the test sends
+def test_a_sensor_that_sends_only_while_it_is_touched(run, serve) -> None:
+    daemon = serve("--clock", "sensor", "--stale-s", 0.2)  # its rate is not that of the burst which the test sends
     sensor, hand = Sensor(daemon, "arm", counted), Hand()
     end = time.monotonic() + DEADLINE_S
     for n in count():  # a busy machine may ask only once the sensor is silent again
@@ -126,8 +111,10 @@ def test_a_rate_outside_the_range_is_told_with_the_range(ctl, daemon: Daemon, ra
     assert ("5 to 1000 Hz" in line) == (level == "warn")
 
 
-def test_rows_and_columns_that_are_exchanged(run, own) -> None:
-    daemon = own('[sensors.wrong]\ngrid = "6x12"\n[sensors.right]\ngrid = "12x6"\n', "--clock", "sensor")
+def test_rows_and_columns_that_are_exchanged(run, serve, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text('[sensors.wrong]\ngrid = "6x12"\n[sensors.right]\ngrid = "12x6"\n')
+    daemon = serve("--clock", "sensor", "--config", config)
     for name in ("wrong", "right"):
         sensor = Sensor(daemon, name)
         for frame in swipes(12, 6):
@@ -140,22 +127,20 @@ def test_rows_and_columns_that_are_exchanged(run, own) -> None:
     assert not any("rows and columns" in found["what"] for found in of("right", out))
 
 
-def test_a_sensor_that_hears_little_says_why(run, own) -> None:
-    daemon = own("", "--clock", "sensor", "--stale-s", 30)
-    control = ("--control", daemon.ready["control"])
-    sensor = Sensor(daemon, "arm").begin()
-    client = daemon.client().subscribe("status")
-    client.until(lambda line: line["sensors"].get("arm") == "ok")
+def test_a_sensor_that_hears_little_says_why(ctl, daemon: Daemon) -> None:
+    sensor = Sensor(daemon, "noisy").begin()
+    client = daemon.client().subscribe("status")  # once a second: by then its usual noise is known
+    client.until(lambda line: line["sensors"].get("noisy") == "ok")
     rubbish = np.random.default_rng(0).integers(0, 2**16, (120, 9, 9)).astype(float)
     sensor.send([*rubbish])
     end = time.monotonic() + DEADLINE_S
-    while "noise" not in (reason := awaited(daemon, "arm", "ok", "degraded")["reason"]):
+    while "noise" not in (reason := awaited(daemon, "noisy", "ok", "degraded")["reason"]):
         assert time.monotonic() < end, reason
-    assert reason in run("status", *control)[1]
-    (found,) = of("arm", run("doctor", *control, "--json")[1])
+    assert reason in ctl("status")[1]
+    (found,) = of("noisy", ctl("doctor", "--json")[1])
     assert found["level"] == "warn" and reason in found["what"] and found["remedy"]
     sensor.send(sensor.hand.idle(3.0))
-    assert awaited(daemon, "arm", "ok")["reason"] == ""
+    assert awaited(daemon, "noisy", "ok")["reason"] == ""
 
 
 @pytest.mark.parametrize("kind", ["dropped", "lost frames", "kernel drops", "lines", "osc"])
