@@ -265,11 +265,14 @@ def test_who_comes_after_the_daemon_has_gone_is_not_told_how_it_was(tmp_path: Pa
 
 
 @pytest.mark.parametrize("wrong", [{"model": "x"}, {"type": 1}, {"type": "view"}, {"type": "view", "sensor": []}])
-def test_what_no_daemon_says_is_a_sentence_on_the_page(fake_control, wrong: dict[str, object]) -> None:
+def test_what_no_daemon_says_is_a_sentence_on_the_page(
+    fake_control, wrong: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gestured.control.view.source.AGAIN_S", 0.05)
     with viewing(fake_control("mad", **wrong)) as page:
         stream = page.come_in().stream()
         for _ in range(2):  # and it is asked again
-            assert "something that gestured does not say" in stream.until("gone")[1]["reason"]
+            assert "says something that gestured" in stream.until("gone")[1]["reason"]
 
 
 def test_moves_of_a_finger_wait_for_a_browser_as_one() -> None:

@@ -118,15 +118,11 @@ class Source:
         with self._changed:
             self._looking, self._looked_at = control, looked_at
             self._look_anew()
-        for line in self._lines(control):
-            try:
-                words = wrong_field(line)
-                if words is None:
-                    self._pass_on(line)
-            except (KeyError, TypeError, AttributeError, ValueError):
-                words = f"a line of the type {line['type']!r} without its fields"
-            if words is not None:
-                raise Refused(f"{self._control} says something that gestured does not say: {words}")
+        with control.reading():
+            for line in self._lines(control):
+                if words := wrong_field(line):
+                    raise Refused(f"{self._control} says something that gestured does not say: {words}")
+                self._pass_on(line)
 
     def _lines(self, control: Control) -> Iterator[dict[str, Any]]:
         """What the daemon streams. Raises Unreachable where it stops to, without hanging up."""
