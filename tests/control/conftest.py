@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
 from socketserver import StreamRequestHandler, ThreadingUnixStreamServer
@@ -27,6 +27,7 @@ from tests.sockets import FakeDaemon, free_address
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBERS = count()
+LONG = "n" * 64  # the longest name that a sensor may have
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
 
@@ -139,16 +140,21 @@ def sniffed(start: Start) -> Callable[..., tuple[int, bytes, bytes]]:
     return sniff
 
 
-@pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A real daemon with a small model, the sensor's clock and a flight recorder; no sensor falls silent soon."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
-    folder = tmp_path_factory.mktemp("daemon")
-    model = tiny_model.make(folder / "tiny.onnx")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--flight-recorder", 4, "--stale-s", 30)
+@contextmanager
+def running(folder: Path, model: Path, *flags: object) -> Iterator[Daemon]:
+    """A real daemon with the sensor's clock, which ends well; no sensor falls silent soon."""
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, *flags)
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
     assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon with a small model and a flight recorder."""
+    folder = tmp_path_factory.mktemp("daemon")
+    with running(folder, tiny_model.make(folder / "tiny.onnx"), "--flight-recorder", 4) as daemon:
+        yield daemon
 
 
 @pytest.fixture
@@ -157,17 +163,16 @@ def ctl(run: Callable[..., tuple[int, str, str]], daemon: Daemon) -> Callable[..
     return lambda *arguments: run(*arguments, "--control", daemon.ready["control"])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A real daemon to look at, with provisional events, fingers, a flight recorder and a sensor with a zone."""
+    """A daemon to look at, with provisional events, fingers, a flight recorder and two sensors with zones."""
     folder = tmp_path_factory.mktemp("real")
     model = tiny_model.make(folder / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
     config = folder / "gestured.toml"
-    config.write_text("touch = true\nflight_recorder = 4\n[sensors.zoned.zones.left]\nat = [0, 0, 0.5, 1]\n")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, "--config", config)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    zones = f"[sensors.zoned.zones.left]\nat = [0, 0, 0.5, 1]\n[sensors.{LONG}.zones.{'z' * 64}]\nat = [0, 0, 1, 1]\n"
+    config.write_text(f"touch = true\nflight_recorder = 4\n{zones}")
+    with running(folder, model, "--config", config) as daemon:
+        yield daemon
 
 
 @pytest.fixture
@@ -183,9 +188,9 @@ def view(real: Daemon, tmp_path: Path) -> Iterator[Page]:
         yield page
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser for all tests of a module."""
+    """A browser for all tests."""
     if PROGRAM is None:
         pytest.skip("chromium is not installed (apt install chromium)")
     with Browser(tmp_path_factory.mktemp("chromium")) as browser:
@@ -197,6 +202,7 @@ def browser(chromium: Browser) -> Iterator[Browser]:
     """A browser that shows nothing yet."""
     yield chromium
     chromium.call("Page.navigate", url="about:blank")
+    chromium.call("Emulation.setTouchEmulationEnabled", enabled=False)
     chromium.said.clear()
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from gestured.control.status import own_faults
+from tests.control.conftest import running
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.test_own import Performer, ready
@@ -16,14 +17,11 @@ from tests.sockets import FakeDaemon
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A real daemon that knows how to learn."""
+    """A daemon that knows how to learn."""
     folder = tmp_path_factory.mktemp("own")
     model = tiny_model.make(folder / "tiny.onnx", own=tiny_model.own())
-    flags = ("--clock", "sensor", "--stale-s", 30, "--own-gestures", folder / "mine.json")
-    daemon = Daemon.start(folder, model, *flags)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    with running(folder, model, "--own-gestures", folder / "mine.json") as daemon:
+        yield daemon
 
 
 @pytest.fixture(scope="module")

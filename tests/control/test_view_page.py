@@ -16,6 +16,7 @@ from gestured.control.view.server import PAGE
 from gestured.core.where import zones_of
 from gestured.record.tape_reader import read
 from tests.control.browser import Browser
+from tests.control.conftest import LONG
 from tests.control.pages import Page, viewing
 from tests.daemon.harness import Daemon, Frame, Sensor
 from tests.documents.blocks import blocks
@@ -181,24 +182,20 @@ def test_what_lies_on_a_sensor_is_said(sensor: Sensor, browser: Browser) -> None
 def test_the_page_says_what_is_wrong_and_what_to_do(serve, browser: Browser) -> None:
     daemon = serve("--clock", "sensor", "--stale-s", 30)
     with viewing(daemon.ready["control"]) as page:
-        _is_told(page, daemon, browser)
-
-
-def _is_told(page: Page, daemon: Daemon, browser: Browser) -> None:
-    browser.call("Page.navigate", url=page.whole)
-    findings = "document.getElementById('findings')?.textContent ?? ''"
-    browser.until(f"({findings}).includes('no sensor was heard')")
-    assert "gesturectl sniff" in browser.run(findings)
-    assert browser.run("document.getElementById('flag').disabled")
-    assert "--flight-recorder" in browser.run("document.getElementById('done').textContent")
-    sensor = Sensor(daemon, "arm").begin()
-    swipe = sensor.hand.swipe("left")
-    for _ in range(6):
-        sensor.send([40.0 - frame for frame in swipe], sensor.hand.idle(1.0))
-    browser.until(f"({findings}).includes('[sensors.arm] invert = true')")
-    assert not browser.run("document.body.classList.contains('absent')")
-    daemon.stop()
-    browser.until("document.body.classList.contains('absent')")  # what is shown is of before
+        browser.call("Page.navigate", url=page.whole)
+        findings = "document.getElementById('findings')?.textContent ?? ''"
+        browser.until(f"({findings}).includes('no sensor was heard')")
+        assert "gesturectl sniff" in browser.run(findings)
+        assert browser.run("document.getElementById('flag').disabled")
+        assert "--flight-recorder" in browser.run("document.getElementById('done').textContent")
+        sensor = Sensor(daemon, "arm").begin()
+        swipe = sensor.hand.swipe("left")
+        for _ in range(6):
+            sensor.send([40.0 - frame for frame in swipe], sensor.hand.idle(1.0))
+        browser.until(f"({findings}).includes('[sensors.arm] invert = true')")
+        assert not browser.run("document.body.classList.contains('absent')")
+        daemon.stop()
+        browser.until("document.body.classList.contains('absent')")  # what is shown is of before
 
 
 def test_the_sensor_that_was_looked_at_stays_when_the_daemon_starts_again(
@@ -392,24 +389,20 @@ def test_a_page_on_another_port_of_this_machine_gets_nothing(sensor: Sensor, vie
     browser.until("document.getElementById('sensor')?.options.length")  # the tab has kept its secret
 
 
-def test_the_longest_names_stick_out_of_no_telephone(serve, tmp_path: Path, browser: Browser) -> None:
-    name, gate, zone = ("n" * 64, "g" * 64, "z" * 64)
-    config = tmp_path / "long.toml"
-    config.write_text(f"[sensors.{name}.zones.{zone}]\nat = [0, 0, 1, 1]\n")
-    daemon = serve("--clock", "sensor", "--stale-s", 30, "--config", config)
-    with viewing(daemon.ready["control"]) as page:
-        sensor = follow(page, browser, name, daemon)
-        browser.size(400, 900)
-        daemon.ask("inhibit", sensor=name, gate=gate)
-        perform(sensor, browser, "left")
-        browser.until(f"document.getElementById('name-note').textContent.includes('{gate}')")
-        browser.until(f"document.getElementById('listens').textContent.includes('{gate}')")
-        browser.run(f"at('zone-name').value = '{zone}'; over.pulled = [0, 0, 0.5, 0.5]; tellZone()")
-        wide = "e => e.getBoundingClientRect().right > 400 && !e.closest('.scroll')"
-        assert browser.run(f"[...document.querySelectorAll('body *')].filter({wide}).map(e => e.id)") == []
-        assert browser.run("document.documentElement.scrollWidth") <= 400
-        event = "document.querySelector('#events tbody td:nth-child(3)').getBoundingClientRect().left"
-        assert browser.run(event) < 400  # the table need not be moved to see what it was
+def test_the_longest_names_stick_out_of_no_telephone(view: Page, real: Daemon, browser: Browser) -> None:
+    gate, zone = "g" * 64, "z" * 64
+    sensor = follow(view, browser, LONG, real)
+    browser.size(400, 900)
+    real.ask("inhibit", sensor=LONG, gate=gate)
+    perform(sensor, browser, "left")
+    browser.until(f"document.getElementById('name-note').textContent.includes('{gate}')")
+    browser.until(f"document.getElementById('listens').textContent.includes('{gate}')")
+    browser.run(f"at('zone-name').value = '{zone}'; over.pulled = [0, 0, 0.5, 0.5]; tellZone()")
+    wide = "e => e.getBoundingClientRect().right > 400 && !e.closest('.scroll')"
+    assert browser.run(f"[...document.querySelectorAll('body *')].filter({wide}).map(e => e.id)") == []
+    assert browser.run("document.documentElement.scrollWidth") <= 400
+    event = "document.querySelector('#events tbody td:nth-child(3)').getBoundingClientRect().left"
+    assert browser.run(event) < 400  # the table need not be moved to see what it was
 
 
 def test_a_name_is_never_markup(fake_control, browser: Browser) -> None:
