@@ -259,7 +259,7 @@ def fake_control(tmp_path: Path) -> Iterator[Callable[..., Path]]:
 
             server = held.enter_context(ThreadingUnixStreamServer(str(tmp_path / "fake.ctl"), Answers))
             server.daemon_threads = True
-            Thread(target=server.serve_forever, daemon=True).start()
+            Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()  # s, until it hears `shutdown`
             held.callback(server.shutdown)
             return tmp_path / "fake.ctl"
 

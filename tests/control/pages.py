@@ -88,7 +88,7 @@ def viewing(control: object, folder: Path = Path()) -> Iterator[Page]:
     """The page of `gesturectl view`, of the daemon with this control socket."""
     source = Source(Path(str(control)), folder)
     with ViewServer(Address("127.0.0.1", 0), source, Door("gesturectl view")) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()  # s, until it hears `shutdown`
         yield Page(server.page)
         source.close()
         server.shutdown()

@@ -48,7 +48,7 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = STRANGERS  # beyond the queue the kernel has a browser try again after a second, then three
+    request_queue_size = 128  # beyond that the kernel has a browser try again, after a second, then three, then seven
 
     def __init__(self, listen: Address, door: Door, page: Path, handler: "type[Handler]") -> None:
         self.door = door
