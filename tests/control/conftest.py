@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -23,7 +22,7 @@ from tests.control.browser import PROGRAM, Browser
 from tests.control.pages import Page, viewing
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
-from tests.sockets import FakeDaemon, free_address
+from tests.sockets import FakeDaemon
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBERS = count()
@@ -120,24 +119,6 @@ def told(run: Callable[..., tuple[int, str, str]], fake: FakeDaemon) -> Callable
             serving.join()
 
     return finish
-
-
-@pytest.fixture
-def sniffed(start: Start) -> Callable[..., tuple[int, bytes, bytes]]:
-    """What `gesturectl sniff` says, with these flags, of packets that are sent again and again while it listens."""
-
-    def sniff(packets: list[bytes], *flags: object) -> tuple[int, bytes, bytes]:
-        where = free_address()
-        process = start("sniff", "--listen", where, "--seconds", 0.5, *flags)
-        assert process.stderr is not None and b"listening" in process.stderr.readline()
-        with socket.socket(type=socket.SOCK_DGRAM) as sender:
-            while process.poll() is None:
-                for packet in packets:
-                    sender.sendto(packet, where)
-        out, err = process.communicate(timeout=30)
-        return process.returncode, out, err
-
-    return sniff
 
 
 @contextmanager

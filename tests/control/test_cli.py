@@ -38,7 +38,7 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model() -> None:
     ("command", "flag", "value"),
     [
         ("demo", "--seconds", "0"), ("simulate", "--seconds", "nan"), ("simulate", "--seconds", "-5"),
-         ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
+        ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
         ("enrol", "--examples", "many"),
         ("listen", "--types", "gestures"), ("listen", "--types", ""), ("listen", "--count", "one"),
         ("listen", "--count", "0"),
@@ -50,6 +50,7 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model() -> None:
         ("simulate", "--rate", "nan"), ("simulate", "--blob", "int12"), ("simulate", "--everyday", "moon"),
         ("sniff", "--seconds", "0"), ("status", "--socket", ""), ("status", "--control", "/"),
         ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
+        ("inhibit --all --gate door", "--for", "0"), ("inhibit --all --gate door", "--for", "soon"),
     ],
 )  # fmt: skip
 def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: str, value: str) -> None:

@@ -3,7 +3,9 @@
 import ast
 import json
 import re
+import socket
 import tomllib
+from threading import Event, Thread
 
 import pytest
 from hypothesis import example as such_as
@@ -11,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.say import MOST, shown
-from gestured.control.proposal import propose
+from gestured.control.proposal import LONGEST_ADDRESS, propose
 from gestured.core.address import is_sensor
 from gestured.core.wire import Addresses
 from tests.control.conftest import ROOT
 from tests.control.test_sniff import seen
 from tests.daemon.harness import Hand, floats
-from tests.sockets import GESTURE, HELLO, FakeDaemon
+from tests.sockets import GESTURE, HELLO, FakeDaemon, free_address
 
 # Sets the title, clears the screen, turns the writing around, begins new lines, ends the string.
 HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"x'
@@ -84,10 +86,6 @@ def test_only_one_module_prints() -> None:
 # Packets
 
 
-def sniffed(*addresses: str) -> list[str]:
-    return propose(seen(raw(address, n) for n in range(3) for address in addresses).rows())
-
-
 def raw(address: str, n: int = 0) -> bytes:
     """A frame of 5 x 5 for any address at all."""
     head = address.encode() + b"\0" * (4 - len(address.encode()) % 4)
@@ -110,9 +108,11 @@ NASTY = [
     st.lists(st.one_of(st.sampled_from(NASTY), st.text(max_size=30).map(lambda t: f"/{t}/arm/pressure")), max_size=4)
 )
 def test_a_proposal_holds_numbers_and_checked_names_alone(addresses: list[str]) -> None:
-    lines = sniffed(*(a.replace("\0", "") for a in addresses if a.isascii() or "\ud800" > max(a)))
+    whole = [a.replace("\0", "") for a in addresses if a.isascii() or "\ud800" > max(a)]
+    lines = propose(seen(raw(address, n) for n in range(3) for address in whole).rows())
     text = "\n".join(line for line in lines if line != "the defaults fit what arrives")
     plain(text)
+    assert all(len(line) < LONGEST_ADDRESS + 100 for line in lines)
     found = tomllib.loads(text)
     assert set(found) <= {"addresses", "sensors"} and set(found.get("addresses", {})) <= {"pressure"}
     if "addresses" in found:
@@ -121,22 +121,30 @@ def test_a_proposal_holds_numbers_and_checked_names_alone(addresses: list[str]) 
         assert is_sensor(name) and table == {"grid": "5x5"}
 
 
-@pytest.mark.parametrize("address", NASTY)
-def test_what_cannot_be_proposed_is_said_and_not_written(address: str) -> None:
-    assert sniffed(address) == []
-    assert sniffed("/arm/pressure", address)[:2] == ["[sensors.arm]", 'grid = "5x5"']
-
-
-def test_sniff_prints_no_foreign_byte(sniffed) -> None:
+def test_sniff_prints_no_foreign_byte(run) -> None:
     packets = [*map(raw, NASTY), b"/" + b"\x1b[2J" * 1000 + b"\0\0\0\0,i\0\0\0\0\0\1", b"\x9b\x1b]0;evil\x07"]
-    status, out, err = sniffed(packets)
-    said = plain(out.decode())
-    assert (status, err) == (1, b"")
-    assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
-    status, out, err = sniffed(packets, "--json")
-    assert (status, err) == (1, b"")
-    assert out.isascii() and out.count(b"\n") == 1 and b"\x1b" not in out
-    assert json.loads(out)["proposed"] == []
+    where, stop = free_address(), Event()
+
+    def send() -> None:
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            while not stop.is_set():
+                for packet in packets:
+                    sender.sendto(packet, where)
+
+    sending = Thread(target=send)
+    sending.start()
+    try:
+        for more in ([], ["--json"]):
+            status, out, err = run("sniff", "--listen", where, "--seconds", 0.2, *more)
+            assert (status, err) == (1, f"listening on {where}\n")
+            said = plain(out)
+            if more:
+                assert out.isascii() and out.count("\n") == 1 and json.loads(out)["proposed"] == []
+            else:
+                assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
+    finally:
+        stop.set()
+        sending.join()
 
 
 # A daemon

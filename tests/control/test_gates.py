@@ -66,13 +66,6 @@ def test_what_cannot_be_is_one_sentence(ctl: Ctl, daemon: Daemon, arguments: tup
     assert "door" not in daemon.ask("status")["gates"]
 
 
-@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
-def test_a_time_that_cannot_be_is_a_mistake_of_usage(ctl: Ctl, daemon: Daemon, seconds: str) -> None:
-    status, _, err = ctl("inhibit", "--all", "--gate", "door", f"--for={seconds}")
-    assert status == 2 and f"--for: '{seconds}': expected a number from" in err
-    assert "door" not in daemon.ask("status")["gates"]
-
-
 def test_there_are_so_many_gates_at_most(daemon: Daemon) -> None:
     for n in range(MOST_GATES):
         daemon.ask("inhibit", gate=f"gate{n}")

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from gestured.client.control import Control
-from gestured.client.lines import Forbidden, Refused, Unreachable, read_ahead
+from gestured.client.lines import Refused, Unreachable, read_ahead
 from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
@@ -200,15 +200,6 @@ def test_without_reconnect_a_daemon_that_is_gone_is_an_error(fake: FakeDaemon, t
     fake.close()
     with pytest.raises(Unreachable, match="closed the connection"):
         next(subscriber)
-
-
-def test_a_socket_that_is_not_for_us_is_not_waited_for(fake: FakeDaemon, monkeypatch: pytest.MonkeyPatch):
-    def connect(self: socket.socket, path: str) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(socket.socket, "connect", connect)
-    with pytest.raises(Forbidden, match="for members of its group"):
-        next(Subscriber(fake.path))
 
 
 def test_no_path_is_a_mistake():

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from benchmarks.viewers import viewer
 from gestured.client.web.door import at_home
 from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
 from gestured.control.view import NICE
@@ -52,13 +51,6 @@ def test_the_folder_for_what_is_flagged_is_made_before_anything_is(start, run, r
     (tmp_path / "file").touch()
     status, out, err = run(*flags, tmp_path / "file")
     assert (status, out) == (1, "") and f"--folder {tmp_path / 'file'}" in err
-
-
-def test_the_browser_of_the_bench_sees_what_a_page_would(real: Daemon, arm: str) -> None:
-    sensor = Sensor(real, arm).begin()
-    sensor.send([sensor.hand.frame()])
-    with viewer(real.ready["control"], arm):  # raises unless the browser says that it sees the sensor
-        pass
 
 
 def test_what_a_browser_is_told_to_allow(view: Page) -> None:
