@@ -14,7 +14,6 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene
 
-LONGEST_ADDRESS = 255  # characters of an address that is proposed
 TRAJECTORY = "/trajectory"
 STEP_S = 1e-6  # from frame to frame at the least, because some were read at one time
 
@@ -107,11 +106,7 @@ def split_address(address: str) -> tuple[str, str] | None:
 
     None where there is none, or where a part could be more than a name.
     """
-    if (
-        address.endswith(TRAJECTORY)
-        or len(address) > LONGEST_ADDRESS
-        or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address)
-    ):
+    if address.endswith(TRAJECTORY) or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address):
         return None
     parts = address.split("/")[1:]
     places = [i for i, part in enumerate(parts) if is_sensor(part)]

@@ -17,7 +17,7 @@ from gestured.client.program import Commands, on_stop
 from gestured.client.say import say, shown, tell
 from gestured.client.values import host_port, number
 from gestured.control.address import add_sockets, connect, finish, finish_after
-from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, propose, split_address
+from gestured.control.proposal import TRAJECTORY, propose, split_address
 from gestured.control.sight import Seen, Sight
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -115,8 +115,7 @@ def _remarks(seen: Seen) -> Iterator[str]:
         several = "has several senders: the daemon takes the first; give each sensor a name of its own"
         yield f"  {address} {several}"
     if split_address(seen.address) is None and not seen.address.endswith(TRAJECTORY):
-        unsafe = f"is not proposed: expected parts of A-Z a-z 0-9 _ - . and at most {LONGEST_ADDRESS} characters"
-        yield f"  {address} {unsafe}"
+        yield f"  {address} is not proposed: expected parts of A-Z a-z 0-9 _ - ."
 
 
 def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, bytes]]:

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.say import MOST, shown
-from gestured.control.proposal import LONGEST_ADDRESS, propose
+from gestured.control.proposal import propose
 from gestured.core.address import is_sensor
+from gestured.core.osc import MAX_ADDRESS
 from gestured.core.wire import Addresses
 from tests.control.conftest import ROOT
 from tests.control.test_sniff import seen
@@ -112,7 +113,7 @@ def test_a_proposal_holds_numbers_and_checked_names_alone(addresses: list[str]) 
     lines = propose(seen(raw(address, n) for n in range(3) for address in whole).rows())
     text = "\n".join(line for line in lines if line != "the defaults fit what arrives")
     plain(text)
-    assert all(len(line) < LONGEST_ADDRESS + 100 for line in lines)
+    assert all(len(line) < MAX_ADDRESS + 100 for line in lines)
     found = tomllib.loads(text)
     assert set(found) <= {"addresses", "sensors"} and set(found.get("addresses", {})) <= {"pressure"}
     if "addresses" in found:
