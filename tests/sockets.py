@@ -1,8 +1,11 @@
-"""Sockets for tests: addresses that nobody has, and a scripted stand-in for the daemon's event socket."""
+"""Sockets for tests: addresses that nobody has, packets that come again and again, a stand-in for the event socket."""
 
 import json
 import socket
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 from gestured.core.address import Address
@@ -40,6 +43,35 @@ def free_address(kind: int = socket.SOCK_DGRAM) -> Address:
     with socket.socket(type=kind) as probe:
         probe.bind(("127.0.0.1", 0))
         return Address(*probe.getsockname())
+
+
+@contextmanager
+def meanwhile(act: Callable[[], object]) -> Iterator[None]:
+    """A thread does this inside of the block, whose end waits for it."""
+    thread = Thread(target=act)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+
+
+@contextmanager
+def sending(packets: Sequence[bytes], where: Address) -> Iterator[None]:
+    """These packets are sent again and again inside of the block."""
+    stop = Event()
+
+    def send() -> None:
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            while not stop.wait(0.005):
+                for packet in packets:
+                    sender.sendto(packet, where)
+
+    with meanwhile(send):
+        try:
+            yield
+        finally:
+            stop.set()
 
 
 class FakeDaemon:

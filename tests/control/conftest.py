@@ -22,7 +22,7 @@ from tests.control.browser import PROGRAM, Browser
 from tests.control.pages import Page, viewing
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
-from tests.sockets import FakeDaemon
+from tests.sockets import FakeDaemon, meanwhile
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBERS = count()
@@ -111,12 +111,8 @@ def told(run: Callable[..., tuple[int, str, str]], fake: FakeDaemon) -> Callable
             fake.say(*said[1:])
             fake.close()
 
-        serving = Thread(target=daemon)
-        serving.start()
-        try:
+        with meanwhile(daemon):
             return run(*arguments)
-        finally:
-            serving.join()
 
     return finish
 

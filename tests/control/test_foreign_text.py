@@ -3,9 +3,7 @@
 import ast
 import json
 import re
-import socket
 import tomllib
-from threading import Event, Thread
 
 import pytest
 from hypothesis import example as such_as
@@ -20,7 +18,7 @@ from gestured.core.wire import Addresses
 from tests.control.conftest import ROOT
 from tests.control.test_sniff import seen
 from tests.daemon.harness import Hand, floats
-from tests.sockets import GESTURE, HELLO, FakeDaemon, free_address
+from tests.sockets import GESTURE, HELLO, FakeDaemon, free_address, sending
 
 # Sets the title, clears the screen, turns the writing around, begins new lines, ends the string.
 HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"x'
@@ -124,28 +122,16 @@ def test_a_proposal_holds_numbers_and_checked_names_alone(addresses: list[str]) 
 
 def test_sniff_prints_no_foreign_byte(run) -> None:
     packets = [*map(raw, NASTY), b"/" + b"\x1b[2J" * 1000 + b"\0\0\0\0,i\0\0\0\0\0\1", b"\x9b\x1b]0;evil\x07"]
-    where, stop = free_address(), Event()
-
-    def send() -> None:
-        with socket.socket(type=socket.SOCK_DGRAM) as sender:
-            while not stop.is_set():
-                for packet in packets:
-                    sender.sendto(packet, where)
-
-    sending = Thread(target=send)
-    sending.start()
-    try:
-        for more in ([], ["--json"]):
+    where = free_address()
+    for more in ([], ["--json"]):
+        with sending(packets, where):
             status, out, err = run("sniff", "--listen", where, "--seconds", 0.2, *more)
-            assert (status, err) == (1, f"listening on {where}\n")
-            said = plain(out)
-            if more:
-                assert out.isascii() and out.count("\n") == 1 and json.loads(out)["proposed"] == []
-            else:
-                assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
-    finally:
-        stop.set()
-        sending.join()
+        assert (status, err) == (1, f"listening on {where}\n")
+        said = plain(out)
+        if more:
+            assert out.isascii() and out.count("\n") == 1 and json.loads(out)["proposed"] == []
+        else:
+            assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
 
 
 # A daemon

@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import socket
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
 from tests.daemon.harness import Daemon, Hand, Sensor, floats
-from tests.sockets import FakeDaemon
+from tests.sockets import FakeDaemon, meanwhile, sending
 
 
 def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
@@ -134,11 +133,9 @@ def test_what_a_daemon_that_hangs_streams_can_be_ended(run, daemon, fake, monkey
         if "--seconds" not in command:
             os.kill(os.getpid(), signal.SIGINT)
 
-    serving = threading.Thread(target=hang)
-    serving.start()
     files = [fake.path.with_suffix(".mcap")] if "record" in command else []
-    status, out, _ = run(*command.split(), *files, "--control", fake.path)
-    serving.join()
+    with meanwhile(hang):
+        status, out, _ = run(*command.split(), *files, "--control", fake.path)
     assert (status, "0 packets" in out) == (int("sniff" in command), True)
 
 
@@ -183,22 +180,10 @@ def test_doctor_names_a_daemon_that_runs_with_another_socket(ctl, run, daemon: D
 
 def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -> None:
     daemon = serve()
-    stop = threading.Event()
-
-    def send() -> None:
-        with socket.socket(type=socket.SOCK_DGRAM) as sock:
-            while not stop.wait(0.01):
-                sock.sendto(floats("/arm/pressure", np.zeros((12, 8)), 0), daemon.address)
-
-    sending = threading.Thread(target=send)
-    sending.start()
-    try:
+    with sending([floats("/arm/pressure", np.zeros((12, 8)), 0)], daemon.address):
         while "size" not in daemon.ask("status")["input"]["dropped"]:
             pass
         out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
-    finally:
-        stop.set()
-        sending.join()
     cause, *rest = [found for found in map(json.loads, out.splitlines()) if found["level"] == "bad"]
     assert "does not fit the settings" in cause["what"]
     assert cause["remedy"].splitlines()[1] == "[sensors.arm]" and re.search(r'grid = "(12x8|8x12)"', cause["remedy"])

@@ -19,7 +19,7 @@ from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon
+from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon, meanwhile
 
 
 @contextmanager
@@ -30,12 +30,8 @@ def serving(fake: FakeDaemon, *lines: object, hello: object = HELLO) -> Iterator
         fake.accept(hello)
         fake.say(*lines)
 
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
+    with meanwhile(serve):
         yield
-    finally:
-        thread.join()
 
 
 def asked(fake: FakeDaemon, subscriber: Subscriber, *lines: object, hello: object = HELLO) -> dict[str, Any]:
@@ -73,11 +69,8 @@ def test_a_daemon_without_a_place_is_asked_again(fake: FakeDaemon):
         fake.accept()
         fake.say(GESTURE)
 
-    thread = threading.Thread(target=crowd)
-    thread.start()
-    with Subscriber(fake.path) as subscriber:
+    with meanwhile(crowd), Subscriber(fake.path) as subscriber:
         assert next(subscriber) == GESTURE
-    thread.join()
 
 
 def test_two_daemons_are_heard_at_once(fake: FakeDaemon, tmp_path: Path):
@@ -115,11 +108,8 @@ def test_a_line_without_end_is_refused_before_it_fills_the_memory(fake: FakeDaem
             while True:
                 fake.say(b" " * 65536)
 
-    thread = threading.Thread(target=serve, daemon=True)
-    thread.start()
-    with pytest.raises(Refused, match=f"{fake.path} sent a line of more than"):
+    with meanwhile(serve), pytest.raises(Refused, match=f"{fake.path} sent a line of more than"):
         next(Subscriber(fake.path))
-    thread.join()
 
 
 def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon):
@@ -175,13 +165,9 @@ def test_close_in_a_signal_handler_ends_the_iteration(fake: FakeDaemon):
         fake.accept()
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
 
-    thread = threading.Thread(target=end)
-    thread.start()
-    try:
+    with meanwhile(end):
         assert list(subscriber) == []
-    finally:
-        thread.join()
-        signal.signal(signal.SIGUSR1, before)
+    signal.signal(signal.SIGUSR1, before)
 
 
 @pytest.mark.parametrize("first", [{"type": "hello", "protocol": 2}, b"SSH-2.0\n", b"\xff\n", b"[]\n"])
