@@ -139,7 +139,8 @@ def test_what_a_daemon_that_hangs_streams_can_be_ended(run, daemon, fake, monkey
     assert (status, "0 packets" in out) == (int("sniff" in command), True)
 
 
-def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> None:
+def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon, monkeypatch) -> None:
+    monkeypatch.setattr("gestured.control.doctor.LOOK_S", 0.2)
     client = daemon.client()
     sensor = Sensor(daemon, "hurt").begin().perform("left")
     client.events("gesture", "hurt")
@@ -178,7 +179,8 @@ def test_doctor_names_a_daemon_that_runs_with_another_socket(ctl, run, daemon: D
     assert not any("start gestured" in found["what"] or "in use" in found["what"] for found in said)
 
 
-def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -> None:
+def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve, monkeypatch) -> None:
+    monkeypatch.setattr("gestured.control.doctor.LOOK_S", 0.2)
     daemon = serve()
     with sending([floats("/arm/pressure", np.zeros((12, 8)), 0)], daemon.address):
         while "size" not in daemon.ask("status")["input"]["dropped"]:
