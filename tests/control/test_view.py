@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from gestured.client.web.door import at_home
-from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
+from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS, Handler
 from gestured.control.view import NICE
 from gestured.control.view.server import PAGE
 from gestured.control.view.source import Looker
@@ -78,6 +78,17 @@ def test_who_trickles_a_request_keeps_nobody_out(view: Page) -> None:
     assert slow[0].recv(1) == b""
     for sock in slow:
         sock.close()
+
+
+def test_who_takes_his_time_is_hung_up_on_and_who_looks_is_not(view: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gestured.client.web.server.ASK_S", 0.5)
+    monkeypatch.setattr(Handler, "timeout", 2 * DEADLINE_S)  # of a single read
+    stream = view.come_in().stream()
+    with socket.create_connection(view.address, timeout=DEADLINE_S) as slow:
+        slow.sendall(b"GET / HT")
+        assert slow.recv(1) == b""
+    for _ in range(2):
+        stream.until("sensors")
 
 
 @pytest.mark.parametrize("target", ["http://[", "http://[x]/", "//[::1/stream", "*"])

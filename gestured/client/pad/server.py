@@ -74,7 +74,8 @@ class PadServer(Server):
         self.tell("told", {"text": text})
 
     def service_actions(self) -> None:
-        """End the address after its time; called twice a second."""
+        """End the address after its time, too."""
+        super().service_actions()
         if time.monotonic() - self._used > self._idle_s and not self.ended.is_set():
             self.door.closed = True
             self.tell("over", {"reason": f"Nobody touched the pad for {self._idle_s / 60:.0f} minutes: it has ended."})

@@ -2,8 +2,7 @@
 
 import json
 import socket
-import threading
-from collections import deque
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from http import HTTPStatus
@@ -55,7 +54,7 @@ class Server(ThreadingHTTPServer):
         self.files = {f"/{path.name}": path for folder in (SHARED, page) for path in folder.iterdir()}
         self.files["/"] = self.files.pop("/index.html")
         self.address_family = socket.AF_INET6 if ":" in listen.host else socket.AF_INET
-        self._strangers: deque[socket.socket] = deque()  # the oldest first
+        self._strangers: dict[socket.socket, float] = {}  # since when they are there (monotonic s), the oldest first
         try:
             super().__init__((listen.host, listen.port), handler)
         except OSError as error:
@@ -69,30 +68,27 @@ class Server(ThreadingHTTPServer):
         return f"http://{self.address}/#{self.door.token}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """A new connection: who takes his time, or all places, gives his to others."""
-        while len(self._strangers) >= STRANGERS:
-            _hang_up(self._strangers.popleft())
-        self._strangers.append(request)
+        """A new connection: who takes all places gives the oldest one's to others."""
+        for oldest in list(self._strangers)[: 1 - STRANGERS]:
+            self.no_stranger(oldest)
+            _hang_up(oldest)
+        self._strangers[request] = time.monotonic()
         super().process_request(request, client_address)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """One connection, in its thread."""
-        deadline = threading.Timer(ASK_S, self._late, (request,))
-        deadline.start()
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            deadline.cancel()
-            self.no_stranger(request)
+    def service_actions(self) -> None:
+        """Hang up on strangers who take their time; called twice a second."""
+        for request, since in list(self._strangers.items()):
+            if time.monotonic() - since > ASK_S:
+                _hang_up(request)
 
-    def _late(self, request: socket.socket) -> None:
-        if request in self._strangers:
-            _hang_up(request)
+    def shutdown_request(self, request: Any) -> None:
+        """The end of a connection."""
+        self.no_stranger(request)
+        super().shutdown_request(request)
 
     def no_stranger(self, request: socket.socket) -> None:
         """Who has shown the secret may stay."""
-        with suppress(ValueError):
-            self._strangers.remove(request)
+        self._strangers.pop(request, None)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that has gone is none of our business."""
