@@ -2,7 +2,7 @@
 
 import argparse
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, cycle
 
@@ -38,30 +38,18 @@ BETWEEN_S = (1.0, 2.0)  # between performances
 def takes(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
     """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0.
 
-    The same flags give the same frames.
+    The same flags give the same frames. With `args.everyday` each is life at that place, of another person.
     """
-    return _parts(args, seconds, lambda part, length: performance(args, length, part))
-
-
-def everyday(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
-    """As `takes`, life at the place `args.everyday`; each part is of another person."""
-
-    def lived(part: int, length: float) -> Take:
-        seed = args.seed + part
-        return day(seed, PLACES[args.everyday], length, _sensor(args, seed)).take
-
-    return _parts(args, seconds, lived)
-
-
-def _parts(
-    args: argparse.Namespace, seconds: float | None, make: Callable[[int, float], Take]
-) -> Iterator[tuple[float, Take]]:
     rows, columns = args.grid
     most = max(min(PART_S, PART_COUNTS / (rows * columns * args.rate)), LEAST_S)
     start, part = 0.0, 0
     while seconds is None or start < seconds:
         length = most if seconds is None else min(most, seconds - start)
-        yield start, make(part, length)
+        if args.everyday:
+            seed = args.seed + part
+            yield start, day(seed, PLACES[args.everyday], length, _sensor(args, seed)).take
+        else:
+            yield start, performance(args, length, part)
         start, part = start + length + OFF_S, part + 1
 
 

@@ -29,7 +29,8 @@ class Seen:
     last: float = 0.0
     sources: set[str] = field(default_factory=set)
     frames: list[tuple[float, NDArray[np.generic] | bytes]] = field(default_factory=list)  # s, what may be a frame
-    steps: int = 0  # by which the first integer grew by one from message to message
+    integer: int | None = None  # the first one of the last message
+    steps: int = 0  # by which it grew by one from message to message
 
     @property
     def rate_hz(self) -> float:
@@ -77,7 +78,6 @@ class Sight:
         self.errors: Counter[str] = Counter()
         self.arrays = 0  # packets with an OSC array
         self._kept = 0  # bytes of frames
-        self._firsts: dict[tuple[str, str], int] = {}  # the first integer of the last message
 
     def rows(self) -> list[Seen]:
         """Each address with each kind of arguments, the most frequent first."""
@@ -103,13 +103,13 @@ class Sight:
             if len(seen.sources) < 4:
                 seen.sources.add(source)
             if key[1] and message.args and isinstance(message.args[-1], np.ndarray | bytes):
-                self._keep(key, seen, t, message.args[-1])
+                self._keep(seen, t, message.args[-1])
 
-    def _keep(self, key: tuple[str, str], seen: Seen, t: float, what: NDArray[np.generic] | bytes) -> None:
+    def _keep(self, seen: Seen, t: float, what: NDArray[np.generic] | bytes) -> None:
         if isinstance(what, np.ndarray) and what.dtype.kind == "i":
-            first, before = int(what[0]), self._firsts.get(key)
-            seen.steps += before is not None and first - before in (1, 1 - 2**32)
-            self._firsts[key] = first
+            first = int(what[0])
+            seen.steps += seen.integer is not None and first - seen.integer in (1, 1 - 2**32)
+            seen.integer = first
         size = len(what) if isinstance(what, bytes) else what.nbytes
         if self._kept + size <= KEPT_BYTES:
             self._kept += size

@@ -11,7 +11,7 @@ from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.client.values import host_port, number, sensor_name
-from gestured.control.play import add_arguments, everyday, frames, takes
+from gestured.control.play import add_arguments, frames, takes
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
-    parts = iter(read_ahead((everyday if args.everyday else takes)(args, args.seconds), 1).get, None)
+    parts = iter(read_ahead(takes(args, args.seconds), 1).get, None)
     first = next(parts)  # the sensor's time begins once it is made; each further one is made while one is sent
     sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     try:
