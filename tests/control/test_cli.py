@@ -59,30 +59,19 @@ def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: 
     assert f"argument {flag}: " in err and value in err
 
 
-def redirected(where: str, *arguments: str) -> tuple[int, str]:
-    """Exit status and standard error of a gesturectl whose standard output a shell has led there."""
-    command = ["sh", "-c", f'exec "$@" {where}', "sh", sys.executable, "-m", "gestured.control", *arguments]
-    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
-    return done.returncode, done.stderr
-
-
-def test_an_output_that_takes_nothing_is_one_sentence_and_no_traceback() -> None:
-    status, err = redirected(">/dev/full", "doctor", "--control", "/nowhere.ctl")
-    assert (status, err) == (1, "gesturectl: standard output cannot be written: No space left on device\n")
-
-
-def test_an_output_that_is_closed_costs_the_words_alone() -> None:
-    assert redirected(">&-", "doctor", "--control", "/nowhere.ctl") == (1, "")
-
-
-def test_an_error_that_nobody_hears_is_not_said_among_the_output() -> None:
-    command = ["sh", "-c", 'exec "$@" 2>&-', "sh", sys.executable, "-m", "gestured.control"]
-    done = subprocess.run([*command, "status", "--json", "--control", "/nowhere.ctl"], stdout=subprocess.PIPE)
-    assert (done.returncode, done.stdout) == (1, b"")
-
-
-def test_an_error_that_cannot_be_said_changes_no_exit_status() -> None:
-    assert redirected("2>/dev/full", "status", "--control", "/nowhere.ctl") == (1, "")
+@pytest.mark.parametrize(
+    ("where", "command", "err"),
+    [
+        (">/dev/full", "doctor", "gesturectl: standard output cannot be written: No space left on device\n"),
+        (">&-", "doctor", ""),  # it costs the words alone
+        ("2>&-", "status --json", ""),  # the error is not said among the output
+        ("2>/dev/full", "status", ""),
+    ],
+)
+def test_an_output_that_takes_nothing_is_no_traceback(where: str, command: str, err: str) -> None:
+    shell = ["sh", "-c", f'exec "$@" {where}', "sh", sys.executable, "-m", "gestured.control", *command.split()]
+    done = subprocess.run([*shell, "--control", "/nowhere.ctl"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", err)
 
 
 @pytest.mark.parametrize("handle", [stop_as_by_ctrl_c, lambda: on_stop(print)])
