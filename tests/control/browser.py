@@ -78,7 +78,7 @@ class Browser:
         end = time.monotonic() + DEADLINE_S
         while not (found := self.run(script)):
             assert time.monotonic() < end, f"never: {script}; the page says {self.run('document.body.innerText')}"
-            time.sleep(0.05)  # for the page's own work
+            time.sleep(0.01)  # for the page's own work
         return found
 
     def size(self, width: int, height: int) -> None:
