@@ -21,7 +21,8 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.mqtt_session import Mqtt
 from gestured.bridge.options import add_filters, add_metrics, need, subscriber
-from gestured.client.program import Commands, on_stop
+from gestured.client.program import Commands
+from gestured.client.stop import on_stop
 from gestured.client.values import sensor_name
 
 

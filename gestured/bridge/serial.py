@@ -16,8 +16,9 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.options import BridgeError, add_destination, add_metrics, need
 from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped
-from gestured.client.program import Commands, on_stop
+from gestured.client.program import Commands
 from gestured.client.sensor import Form, connected, sent_after_refusal
+from gestured.client.stop import on_stop
 from gestured.client.values import number, rows_by_columns, sensor_name
 from gestured.core.frames import Frame
 

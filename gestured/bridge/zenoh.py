@@ -18,7 +18,8 @@ from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.options import add_destination, add_filters, add_metrics, need, subscriber
 from gestured.bridge.zenoh_ros import Ros
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
-from gestured.client.program import Commands, on_stop
+from gestured.client.program import Commands
+from gestured.client.stop import on_stop
 from gestured.client.values import sensor_name
 
 LAST_S = 1.0  # that a router may take, once the bridge was told to end: to answer its call, or its good-bye

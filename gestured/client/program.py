@@ -2,10 +2,8 @@
 
 import argparse
 import os
-import signal
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any, TextIO, TypeAlias
 
 import gestured
@@ -51,21 +49,6 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
         for stream in (sys.stdout, sys.stderr):
             _give_up(stream)
     return status
-
-
-def on_stop(act: Callable[[], object]) -> None:
-    """Act when SIGTERM, Ctrl-C or a closed terminal asks for the end."""
-    asks = [signal.SIGTERM, signal.SIGINT]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # `nohup` has it ignored: its program needs no terminal
-        asks.append(signal.SIGHUP)
-    for number in asks:
-        signal.signal(number, lambda *_: act())
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, asks)  # a process inherits blocked signals from its parent
-
-
-def stop_as_by_ctrl_c() -> None:
-    """Let SIGTERM, and a terminal that is closed, end this program as Ctrl-C does: what it has started ends, too."""
-    on_stop(partial(signal.default_int_handler, signal.SIGINT, None))
 
 
 def _give_up(stream: TextIO) -> None:

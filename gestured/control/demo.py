@@ -18,9 +18,10 @@ from gestured.client.lines import read_ahead
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import PadServer
 from gestured.client.picture import trace
-from gestured.client.program import Commands, stop_as_by_ctrl_c
+from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
+from gestured.client.stop import stop_as_by_ctrl_c
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import number
 from gestured.control.play import add_arguments, frames, performance

@@ -9,8 +9,9 @@ from gestured.client.engine import Engine
 from gestured.client.pad.invitation import invite
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import DEFAULT, PadServer
-from gestured.client.program import Commands, stop_as_by_ctrl_c
+from gestured.client.program import Commands
 from gestured.client.say import say, tell
+from gestured.client.stop import stop_as_by_ctrl_c
 from gestured.client.values import bind_address, host_port, number, rows_by_columns, sensor_name
 from gestured.control.address import add_sockets, event_path
 from gestured.core.errors import GesturedError, SettingsError

@@ -13,8 +13,9 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable, read_ahead
-from gestured.client.program import Commands, on_stop
+from gestured.client.program import Commands
 from gestured.client.say import say, tell
+from gestured.client.stop import on_stop
 from gestured.client.values import number
 from gestured.control.address import add_sockets, connect, finish, finish_after
 from gestured.core.address import Address

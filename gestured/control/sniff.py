@@ -13,8 +13,9 @@ from functools import partial
 from gestured.client.address import bind_failure, look_up
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
-from gestured.client.program import Commands, on_stop
+from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell
+from gestured.client.stop import on_stop
 from gestured.client.values import host_port, number
 from gestured.control.address import add_sockets, connect, finish, finish_after
 from gestured.control.proposal import TRAJECTORY, propose, split_address

@@ -10,8 +10,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gestured.client.program import Parser, on_stop, program, run, stop_as_by_ctrl_c
+from gestured.client.program import Parser, program, run
 from gestured.client.say import say
+from gestured.client.stop import stop_as_by_ctrl_c, stop_later
 from gestured.client.values import number
 from gestured.core.errors import GesturedError
 
@@ -198,19 +199,15 @@ def _program(command: str) -> ModuleType:
     Whoever asks for the end, as by Ctrl-C, waits meanwhile: a library of which half was imported ends in a traceback of
     its own. SIGTERM alone would leave the processes behind that --jobs starts.
     """
-    asked: list[bool] = []
-    on_stop(lambda: asked.append(True))
+    stop_as_by_ctrl_c()
     try:
-        return import_module(PROGRAMS[command])
+        with stop_later():
+            return import_module(PROGRAMS[command])
     except ModuleNotFoundError as error:
         package = (error.name or "").split(".")[0]
         if package not in LAB_PACKAGES:
             raise
         raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
-    finally:
-        stop_as_by_ctrl_c()
-        if asked:
-            raise KeyboardInterrupt
 
 
 def _check(args: argparse.Namespace) -> None:

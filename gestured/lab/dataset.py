@@ -7,6 +7,7 @@ matched with what was performed. Simulated sets are cached, keyed by everything 
 import multiprocessing
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing.pool import IMapIterator
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.client.stop import stop_later
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
@@ -186,7 +188,10 @@ def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title
     """
     jobs = min(jobs, len(todo) or 1)
     others = multiprocessing.active_children()
-    with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with ExitStack() as stack:
+        with stop_later():  # a process that loses its parent while it starts ends in a traceback
+            pool = multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+            stack.enter_context(pool)
         workers = [process for process in multiprocessing.active_children() if process not in others]
         made = pool.imap(make, todo)  # in chunks it would give a generator, which knows no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from gestured.client.program import on_stop, stop_as_by_ctrl_c
+from gestured.client.stop import on_stop, stop_as_by_ctrl_c
 from gestured.control.cli import SUBCOMMANDS, parser
 
 HEAVY = ("pythonosc", "onnxruntime", "gestured.simulator", "gestured.model", "gestured.record.")

@@ -5,8 +5,9 @@ import os
 import sys
 from pathlib import Path
 
-from gestured.client.program import Commands, stop_as_by_ctrl_c
+from gestured.client.program import Commands
 from gestured.client.say import say, tell
+from gestured.client.stop import stop_as_by_ctrl_c
 from gestured.client.values import bind_address
 from gestured.control.address import add_sockets, connect, control_path
 from gestured.core.address import Address
