@@ -117,7 +117,7 @@ class UnixListener(Listener):
             finally:
                 os.umask(before)
             self.sock.listen(BACKLOG)
-            self._inode = path.stat().st_ino
+            self._made = path.stat()
         except OSError as error:
             self._release_lock()
             raise AddressError(f"{self._key}: cannot bind {path}: {error.strerror}") from error
@@ -126,11 +126,9 @@ class UnixListener(Listener):
             raise
 
     def close(self) -> None:
-        """Stop listening; remove the socket if it is still ours, and the lock."""
+        """Remove the socket and the lock unless another daemon's stand there by now, and stop listening."""
+        _remove(self.path, self._made)  # before it is closed: then another file may get its number
         self.sock.close()
-        with suppress(OSError):  # somebody removed it already
-            if self.path.lstat().st_ino == self._inode:
-                self.path.unlink()
         self._release_lock()
 
     def _take_lock(self) -> int:
@@ -138,7 +136,7 @@ class UnixListener(Listener):
             lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o660)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if os.fstat(lock).st_ino == os.stat(self._lock_path).st_ino:
+                if os.path.samestat(os.fstat(lock), os.stat(self._lock_path)):
                     return lock
             except BlockingIOError:
                 os.close(lock)
@@ -148,8 +146,7 @@ class UnixListener(Listener):
             os.close(lock)
 
     def _release_lock(self) -> None:
-        with suppress(OSError):
-            self._lock_path.unlink()
+        _remove(self._lock_path, os.fstat(self._lock))
         os.close(self._lock)
 
     def _clear(self) -> None:
@@ -164,6 +161,13 @@ class UnixListener(Listener):
         if found != errno.ECONNREFUSED:
             raise AddressError(f"{self._key}: another program is using {self.path}")
         self.path.unlink()
+
+
+def _remove(path: Path, ours: os.stat_result) -> None:
+    """Remove a file if it is still the one that we made."""
+    with suppress(OSError):  # somebody removed it already
+        if os.path.samestat(path.lstat(), ours):
+            path.unlink()
 
 
 def make_default_directory(directory: Path) -> None:

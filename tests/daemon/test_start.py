@@ -14,6 +14,7 @@ import pytest
 from gestured.core.errors import SettingsError
 from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
+from gestured.daemon.sockets import AddressError, UnixListener
 from tests.daemon.harness import DEADLINE_S, Client, Daemon, Sensor, lines_of
 from tests.daemon.parts import settings_of
 
@@ -105,6 +106,21 @@ def test_a_stale_socket_is_taken_over_and_anything_else_is_not(start, model: Pat
         assert other.exists()
     missing = tmp_path / "no" / "such" / "folder.sock"
     assert str(missing) in refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", missing)
+
+
+def test_a_daemon_that_ends_late_leaves_the_socket_and_the_lock_of_the_one_in_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "events.sock"
+    old = UnixListener(path)
+    for file in tmp_path.iterdir():
+        file.unlink()  # as where somebody has cleaned up, so that another daemon could start
+    new = UnixListener(path)
+    old.close()
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(path))
+    with pytest.raises(AddressError, match="another gestured is using"):
+        UnixListener(path)
+    new.close()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None:
