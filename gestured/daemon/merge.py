@@ -133,7 +133,7 @@ def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple
         merged |= values
         sources |= dict.fromkeys(values, source)
     try:
-        return Settings.model_validate(merged), sources
+        return Settings.model_validate(merged, context={*environment, *flags}), sources
     except ValidationError as error:
         problems = error.errors(include_url=False, include_context=False)
         raise SettingsError("; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))) from error

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
 from gestured.core.listening import LONGEST_S, Arming
@@ -14,14 +14,17 @@ from gestured.core.where import zones_of
 from gestured.core.wire import Addresses
 from gestured.daemon.values import (
     AddressField,
+    Count,
     DestinationField,
     FileField,
     GateName,
     GridField,
     Listed,
     NetworkField,
+    Number,
     SensorName,
     SocketField,
+    Switch,
 )
 
 
@@ -30,20 +33,11 @@ class Part(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
 
-    @field_validator("*", mode="before")
-    @classmethod
-    def _true_is_no_number(cls, value: object, field: ValidationInfo) -> object:
-        """ValueError for true and false where a number is expected: pydantic takes them for 1 and 0."""
-        kind = cls.model_fields[field.field_name or ""].annotation
-        if isinstance(value, bool) and kind in (int, float, float | None):
-            raise ValueError("a number")
-        return value
-
 
 class ZoneSettings(Part):
     """`[sensors.NAME.zones.ZONE]`: one zone of a sensor."""
 
-    at: tuple[float, float, float, float] = Field(
+    at: tuple[Number, Number, Number, Number] = Field(
         description="left, bottom, right and top edge in fractions of the sensor as a person in front of it sees it"
     )
     gestures: Annotated[tuple[str, ...], Listed] | None = Field(
@@ -55,7 +49,7 @@ class ArmingSettings(Part):
     """`[arming]`, `[sensors.NAME.arming]`: the gesture before which no other counts."""
 
     by: str = Field(description="the gesture that arms: one in use, or an own one that was enrolled")
-    seconds: float = Field(
+    seconds: Number = Field(
         default=Arming("").seconds,
         gt=0,
         le=LONGEST_S,
@@ -78,8 +72,8 @@ class SensorSettings(Part):
         default=None, description="rows x columns of its frames; by default the general `grid`"
     )
     rotate: Literal[0, 90, 180, 270] = Field(default=0, description="how far it is turned, in degrees clockwise")
-    mirror: bool = Field(default=False, description="whether left and right are exchanged")
-    invert: bool = Field(default=False, description="whether its counts fall under pressure")
+    mirror: Switch = Field(default=False, description="whether left and right are exchanged")
+    invert: Switch = Field(default=False, description="whether its counts fall under pressure")
     clock: Literal["arrival", "sensor"] | None = Field(
         default=None, description="where its frames' times come from; by default the general `clock`"
     )
@@ -102,13 +96,13 @@ class SensorSettings(Part):
 class GestureSettings(Part):
     """`[gestures.NAME]`: when one gesture counts."""
 
-    threshold: float | None = Field(
+    threshold: Number | None = Field(
         default=None,
         ge=0,
         le=1,
         description="confidence below which it is unknown, whatever the `strictness`; by default the model's",
     )
-    refractory_s: float = Field(
+    refractory_s: Number = Field(
         default=0, ge=0, le=3600, description="seconds in which the same gesture is not published again"
     )
 
@@ -180,28 +174,31 @@ class Settings(Part):
         default="arrival",
         description="where a frame's time comes from: its arrival, or the increments of the sensor's time tags",
     )
-    stale_s: float = Field(
-        default=1.0, ge=STALE_S[0], le=STALE_S[1], description="seconds of silence after which a sensor counts as gone"
+    stale_s: Number = Field(
+        default=Timing().stale_s,
+        ge=STALE_S[0],
+        le=STALE_S[1],
+        description="seconds of silence after which a sensor counts as gone",
     )
-    tap_gap_s: float = Field(
+    tap_gap_s: Number = Field(
         default=Timing().tap_gap_s,
         ge=TAP_GAP_S[0],
         le=TAP_GAP_S[1],
         description="seconds that a tap waits for a second one",
     )
-    provisional_taps: bool = Field(
+    provisional_taps: Switch = Field(
         default=True,
         description="whether a single tap gets a provisional event before it is sure that no second one follows",
     )
-    publish_provisional: bool = Field(
+    publish_provisional: Switch = Field(
         default=False, description="whether provisional events and their revocations are also sent to `publish`"
     )
-    touch: bool = Field(
+    touch: Switch = Field(
         default=False,
         description="whether clients may follow fingers while they touch, by events of the type touch; they tell who "
         "presses what, and when",
     )
-    max_sensors: int = Field(
+    max_sensors: Count = Field(
         default=64,
         ge=1,
         le=MOST_SENSORS,
@@ -210,7 +207,7 @@ class Settings(Part):
     allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
         default=(), description="addresses or networks that may send frames; any unless set"
     )
-    flight_recorder: int = Field(
+    flight_recorder: Count = Field(
         default=0,
         ge=0,
         le=1024,

@@ -6,20 +6,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, ValidationInfo
 
 from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES, named
 from gestured.core.address import Address, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
+SWITCH, NUMBER, COUNT = "true or false", "a number", "a whole number"
 # What was expected, by pydantic's type of an error, where pydantic's own message speaks of Python's types.
 WORDS = {
     "tuple_type": "a list",
     "string_too_short": "a text that is not empty",
     **dict.fromkeys(("string_type", "string_unicode"), "a text"),
-    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
-    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
-    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "a whole number"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), SWITCH),
+    **dict.fromkeys(("float_type", "float_parsing"), NUMBER),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), COUNT),
 }
 
 
@@ -90,12 +91,30 @@ def _network(value: object) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
         raise ValueError("an address or a network, such as 127.0.0.1, 192.168.7.0/24 or fd00::/8") from None
 
 
+def _typed(expected: str) -> BeforeValidator:
+    """No text and no `true` passes for a number, as they would for pydantic; flags and variables hold nothing but text.
+
+    The keys that these gave are the context of a validation.
+    """
+
+    def checked(value: object, field: ValidationInfo) -> object:
+        text = isinstance(value, str) and field.field_name not in (field.context or ())
+        if text or (isinstance(value, bool) and expected != SWITCH):
+            raise ValueError(expected)
+        return value
+
+    return BeforeValidator(checked)
+
+
 def _listed(value: object) -> object:
     """A flag or a variable holds several values with commas between them; the file holds a list."""
     return [word.strip() for word in value.split(",") if word.strip()] if isinstance(value, str) else value
 
 
 Listed = BeforeValidator(_listed)
+Switch = Annotated[bool, _typed(SWITCH)]
+Number = Annotated[float, _typed(NUMBER)]
+Count = Annotated[int, _typed(COUNT)]
 AddressField = Annotated[Address, BeforeValidator(lambda value: named(_text(value)))]
 GridField = Annotated[Grid, BeforeValidator(lambda value: Grid.parse(_text(value)))]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
