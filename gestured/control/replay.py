@@ -23,6 +23,7 @@ from gestured.control.listen import readable
 from gestured.core import messages
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError, RecordingError
+from gestured.core.events import Status
 from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.own import Own
@@ -101,12 +102,14 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
         replay = Replay(source.tape, scene, ladder, provisional=args.provisional)
     except RecordingError as error:
         raise RecordingError(f"{args.file}: {error}") from error
-    lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         another = isinstance(source, Recorded) and ladder.model.sha256 != source.maker.sha256
-        return _compare(args, source, list(lines), replay.knew, another=another)
+        events = [event for event in replay.events() if not isinstance(event, Status)]
+        lines = [json.loads(messages.to_json(event, replay.epoch_of(event.sensor))) for event in events]
+        return _compare(args, source, lines, replay.knew, another=another)
     early: dict[str, dict[str, Any]] = {}  # for `readable`
-    for line in lines:
+    for event in replay.events():
+        line = json.loads(messages.to_json(event, replay.epoch))
         tell(args.json, line, readable(line, early))
     return 0
 

@@ -7,12 +7,14 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
+from operator import sub
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, RecordingError
-from gestured.core.events import Event
+from gestured.core.events import Event, Onset
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
@@ -101,8 +103,11 @@ def frames_used(tape: Tape, scene: Scene) -> dict[str, list[Frame]]:
     used: dict[str, list[Frame]] = {}
     for fact in replay.facts():
         if isinstance(fact, Taken):
-            used.setdefault(fact.sensor, []).append(dataclasses.replace(fact.frame, t=fact.frame.t + replay.epoch))
-    return used
+            used.setdefault(fact.sensor, []).append(fact.frame)
+    return {
+        name: [dataclasses.replace(frame, t=frame.t + replay.epoch_of(name)) for frame in frames]
+        for name, frames in used.items()
+    }
 
 
 class Replay:
@@ -122,6 +127,12 @@ class Replay:
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9
         self._tape = tape
+        # By sensor and the time of packets (ns): when contacts began that these opened in the daemon, in s since 1970.
+        self._told: dict[tuple[str, int], list[float]] = {}
+        for t_ns, event in zip(tape.told_ns, tape.events, strict=False):
+            if event["type"] == "onset":
+                self._told.setdefault((event["sensor"], t_ns), []).append(event["onset"])
+        self._ahead: dict[str, list[float]] = {}  # by sensor: s by which the daemon's time of a contact was later
 
     def events(self) -> Iterator[Event]:
         """All that comes of it, to the end, where every sensor falls silent."""
@@ -140,13 +151,32 @@ class Replay:
                 yield from self._seen(self._hub.tick(silent) if silent < now else [])
             while gates and gates[0]["since"] - self.epoch < now:
                 yield from self._seen(self._gate(gates.popleft()))
-            yield from self._seen(self._hub.receive([(packet.data, packet.source) for packet in packets], now))
+            facts = self._hub.receive([(packet.data, packet.source) for packet in packets], now)
+            self._compare([fact for fact in facts if isinstance(fact, Onset)], t_ns)
+            yield from self._seen(facts)
             yield from self._seen(self._hub.tick(now))
         yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
 
+    def _compare(self, opened: list[Onset], t_ns: int) -> None:
+        """Hold the contacts that the packets of `t_ns` have opened here against those in the daemon."""
+        for sensor in {one.sensor for one in opened}:
+            here = [one.onset + self.epoch for one in opened if one.sensor == sensor]
+            there = self._told.get((sensor, t_ns), [])
+            if len(here) == len(there):
+                self._ahead.setdefault(sensor, []).extend(map(sub, there, here))
+
+    def epoch_of(self, sensor: str) -> float:
+        """What makes the times of a sensor the daemon's, in s since 1970, as far as it has been played.
+
+        A sensor's own clock may have been ahead where the tape begins, which packets do not tell. So contacts tell it
+        that the same packets have opened in both.
+        """
+        own_clock = self._hub.scene.clock_of(sensor) == "sensor"
+        return self.epoch + (median(self._ahead.get(sensor, [0.0])) if own_clock else 0.0)
+
     def knew(self, sensor: str, t: float) -> bool:
-        """Whether a sensor's idle state was known at `t`, in s since 1970, as far as it has been played."""
-        return sensor in self.played and self.played[sensor].knew(t - self.epoch)
+        """Whether a sensor's idle state was known at `t`, in the daemon's time, as far as it has been played."""
+        return sensor in self.played and self.played[sensor].knew(t - self.epoch_of(sensor))
 
     def _gate(self, told: Mapping[str, Any]) -> list[Fact]:
         """What the tape tells of a sensor's gates; where that was so before its first packet, of its arming, too."""

@@ -49,9 +49,13 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Tape:
-    """What a file holds, in the order of writing. `whole` is false where writing was cut off."""
+    """What a file holds, in the order of writing. `whole` is false where writing was cut off.
+
+    `told_ns` is when each event was told: the time of the packets that came last before it.
+    """
 
     scene: Mapping[str, Any]
     packets: tuple[Packet, ...]
     events: tuple[Mapping[str, Any], ...]
     whole: bool
+    told_ns: tuple[int, ...] = ()

@@ -51,6 +51,30 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
     assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
 
 
+def test_a_tape_that_begins_while_the_sensors_clock_is_ahead_is_one_like_any_other(
+    recorded, run, daemon, tmp_path
+) -> None:
+    sensor = Sensor(daemon, "ahead").begin()
+    sensor.send(sensor.hand.idle(30.0)).perform("tap")  # within a fraction of that time
+    client = daemon.client().subscribe("gesture", sensors=["ahead"])
+
+    def perform() -> None:
+        sensor.begin().perform("left", "up")
+        client.until(lambda line: line.get("gesture") == "swipe_up")
+
+    path, _ = recorded(perform)
+    told = [event for event in tape_reader.read(path).events if event.get("gesture") in ("swipe_left", "swipe_up")]
+    model = tape_reader.read(path).scene["settings"]["model"]
+    status, out, err = run("replay", path, "--diff", "--model", model)
+    assert (status, out) == (0, "") and "2 recorded answers" in err
+    assert run("export", path, tmp_path / "ahead.npz")[0] == 0
+    found = recording.read(tmp_path / "ahead.npz")
+    assert found.event_labels.tolist() == ["swipe_left", "swipe_up"] == [event["gesture"] for event in told]
+    assert found.event_onsets.tolist() == [event["onset"] for event in told]
+    for event in told:  # each begins with one of the frames
+        assert np.abs(found.times - event["onset"]).min() < 0.001
+
+
 def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, tmp_path) -> None:
     path, _ = recorded(gestures(daemon, "dif", "left", "tap"))
     names = list(tiny_model.GESTURES)
