@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,36 @@ from tests.small_model import WINDOW, segment
 
 Point = tuple[float, float]
 Begin = Callable[..., Daemon]
+CONFIG, MODEL = "gestured.toml", "tiny.onnx"
+NUMBERS = count()
 
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
-    return tiny_model.make(tmp_path / "tiny.onnx", own=tiny_model.own())
+    return tiny_model.make(tmp_path / MODEL, own=tiny_model.own())
+
+
+@pytest.fixture(scope="module")
+def lasting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon with a configuration, a model and own gestures in its folder."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / CONFIG).touch()
+    model = tiny_model.make(folder / MODEL, own=tiny_model.own())
+    flags = ("--config", folder / CONFIG, "--clock", "sensor", "--stale-s", 30)
+    daemon = Daemon.start(folder, model, *flags, env={"STATE_DIRECTORY": str(folder)})
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture
+def daemon(lasting: Daemon) -> Iterator[Daemon]:
+    """That daemon. What a test sets and enrols is gone after it; each has sensors of its own."""
+    yield lasting
+    (lasting.folder / CONFIG).write_text("")
+    lasting.ask("reload")
+    for name in lasting.ask("gestures")["own"]["gestures"]:
+        lasting.ask("forget", name=name)
 
 
 @pytest.fixture
@@ -75,17 +101,18 @@ class Performer(Sensor):
 class Enrolment:
     """A client that enrols."""
 
-    def __init__(self, daemon: Daemon, name: str, sensor: str = "armrest", examples: int = 2) -> None:
+    def __init__(self, daemon: Daemon, name: str, sensor: Sensor, examples: int = 2) -> None:
         self.control = daemon.control()
-        self.control.ask("enrol", name=name, sensor=sensor, examples=examples)
+        self.control.ask("enrol", name=name, sensor=sensor.name, examples=examples)
         self._lines = self.control.lines()
 
     def line(self) -> dict[str, Any]:
         return next(self._lines)
 
 
-def ready(daemon: Daemon, name: str = "armrest", seed: int = 0) -> Performer:
-    """A sensor that the daemon has learned."""
+def ready(daemon: Daemon, seed: int = 0) -> Performer:
+    """A sensor that no other test has, and that the daemon has learned."""
+    name = f"arm{next(NUMBERS)}"
     client = daemon.client().subscribe("gesture", sensors=[name])
     sensor = Performer(daemon, name, seed=seed)
     sensor.begin().perform("left")
@@ -96,7 +123,7 @@ def ready(daemon: Daemon, name: str = "armrest", seed: int = 0) -> Performer:
 
 def enrol(daemon: Daemon, sensor: Performer, name: str = "slash", examples: int = 2) -> None:
     """Teach it a stroke."""
-    enrolment = Enrolment(daemon, name, sensor.name, examples)
+    enrolment = Enrolment(daemon, name, sensor, examples)
     for _ in range(examples):
         sensor.slash()
         assert enrolment.line()["kept"] is True
@@ -110,9 +137,8 @@ def answer(client: Client, sensor: Performer, perform: Callable[[], object]) -> 
     return client.until(lambda line: line["type"] in ("gesture", "unknown", "cancelled"))[-1]
 
 
-def test_what_was_enrolled_is_recognised_on_every_sensor_without_a_restart(begin: Begin) -> None:
-    daemon = begin()
-    sensor, other = ready(daemon), ready(daemon, "seat", seed=5)
+def test_what_was_enrolled_is_recognised_on_every_sensor_without_a_restart(daemon: Daemon) -> None:
+    sensor, other = ready(daemon), ready(daemon, seed=5)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
     before = answer(client, sensor, sensor.slash)
     assert before["type"] == "unknown"
@@ -131,13 +157,12 @@ def test_what_was_enrolled_is_recognised_on_every_sensor_without_a_restart(begin
     assert daemon.client().hello["gestures"] == [*tiny_model.GESTURES, "slash"]
 
 
-def test_one_may_be_taken_from_the_model_only_where_it_is_much_nearer(begin: Begin) -> None:
+def test_one_may_be_taken_from_the_model_only_where_it_is_much_nearer(daemon: Daemon) -> None:
     """Slowly drawn, the model is sure that it is a double tap; nothing like it was among those."""
-    daemon = begin()
     sensor = ready(daemon)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
     assert answer(client, sensor, lambda: sensor.slash(14))["gesture"] == "double_tap"
-    enrolment = Enrolment(daemon, "slow", examples=1)
+    enrolment = Enrolment(daemon, "slow", sensor, examples=1)
     assert answer(client, sensor, lambda: sensor.slash(14))["gesture"] == "double_tap"
     assert enrolment.line()["kept"] is True
     assert enrolment.line() == {"enrolled": "slow", "examples": 1}
@@ -146,10 +171,9 @@ def test_one_may_be_taken_from_the_model_only_where_it_is_much_nearer(begin: Beg
     assert answer(client, sensor, lambda: sensor.perform("right"))["gesture"] == "swipe_right"
 
 
-def test_each_example_is_judged_at_once(begin: Begin) -> None:
-    daemon = begin()
+def test_each_example_is_judged_at_once(daemon: Daemon) -> None:
     sensor = ready(daemon)
-    enrolment = Enrolment(daemon, "slash")
+    enrolment = Enrolment(daemon, "slash", sensor)
     for perform, words in (
         (lambda: sensor.perform("tap"), "too short"),
         (lambda: sensor.perform("left"), "the same as swipe_left (0.9"),
@@ -168,7 +192,7 @@ def test_each_example_is_judged_at_once(begin: Begin) -> None:
     sensor.slash()
     assert enrolment.line() == {"example": 2, "kept": True, "reason": None}
     assert enrolment.line() == {"enrolled": "slash", "examples": 2}
-    again = Enrolment(daemon, "cut", examples=1)
+    again = Enrolment(daemon, "cut", sensor, examples=1)
     sensor.slash()
     line = again.line()
     assert (line["kept"], "the same as slash" in line["reason"]) == (False, True)
@@ -177,8 +201,7 @@ def test_each_example_is_judged_at_once(begin: Begin) -> None:
     assert again.line()["kept"] is True and again.line() == {"enrolled": "cut", "examples": 1}
 
 
-def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_path: Path) -> None:
-    daemon = begin()
+def test_one_enrolment_at_a_time_and_none_outlives_its_client(daemon: Daemon) -> None:
     sensor = ready(daemon)
     for name, examples, words in (
         ("swipe_left", 2, "is a gesture of tiny"),
@@ -186,34 +209,33 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
         ("slash", 6, "expected 1 to 5 examples, found 6"),
     ):
         with pytest.raises(Refused, match=words):
-            Enrolment(daemon, name, examples=examples)
-    first = Enrolment(daemon, "slash")
+            Enrolment(daemon, name, sensor, examples=examples)
+    first = Enrolment(daemon, "slash", sensor)
     sensor.slash()
     assert first.line()["kept"] is True
-    with pytest.raises(Refused, match="'slash' is being enrolled on armrest"):
-        Enrolment(daemon, "cut")
+    with pytest.raises(Refused, match=f"'slash' is being enrolled on {sensor.name}"):
+        Enrolment(daemon, "cut", sensor)
     with pytest.raises(Refused, match="a tap already"):
-        first.control.ask("enrol", name="cut", sensor="armrest")
+        first.control.ask("enrol", name="cut", sensor=sensor.name)
     daemon.ask("reload")
     assert first.line()["given_up"] == "slash" and daemon.ask("gestures")["own"]["enrolling"] is None
-    first = Enrolment(daemon, "slash")
+    first = Enrolment(daemon, "slash", sensor)
     sensor.slash()
     assert first.line()["kept"] is True
     first.control.close()
     while daemon.ask("gestures")["own"]["enrolling"] is not None:
         daemon.client().subscribe("status").until(lambda line: line["type"] == "status")
-    assert not (tmp_path / "own-gestures.json").exists()
+    assert daemon.ask("gestures")["own"]["gestures"] == {}
     enrol(daemon, sensor, "cut")
     assert daemon.ask("gestures")["own"]["gestures"] == {"cut": 2}
 
 
-def test_what_is_performed_while_a_gate_is_closed_is_answered_too(begin: Begin) -> None:
-    daemon = begin()
+def test_what_is_performed_while_a_gate_is_closed_is_answered_too(daemon: Daemon) -> None:
     sensor = ready(daemon)
-    enrolment = Enrolment(daemon, "slash", examples=1)
+    enrolment = Enrolment(daemon, "slash", sensor, examples=1)
     daemon.ask("inhibit", gate="door")
     sensor.slash()
-    reason = "armrest is silent, since gates are closed: door; allow them first"
+    reason = f"{sensor.name} is silent, since gates are closed: door; allow them first"
     assert enrolment.line() == {"example": 1, "kept": False, "reason": reason}
     daemon.ask("allow", gate="door")
     sensor.slash()
@@ -250,13 +272,13 @@ def test_of_two_daemons_with_one_file_the_first_writes_it(begin: Begin, tmp_path
     other = ready(second)
     client = second.client().subscribe("gesture", "unknown", "cancelled")
     assert answer(client, other, other.slash)["gesture"] == "slash"
-    for verb, more in (("enrol", {"name": "cut", "sensor": "armrest"}), ("forget", {"name": "slash"})):
+    for verb, more in (("enrol", {"name": "cut", "sensor": other.name}), ("forget", {"name": "slash"})):
         with pytest.raises(Refused, match=rf"another gestured \(pid {first.process.pid}\) writes it"):
             second.ask(verb, **more)
     assert f"pid {first.process.pid}" in second.ask("gestures")["own"]["fault"]
     first.ask("forget", name="slash")
     assert first.stop() == 0
-    enrolment = Enrolment(second, "cut", examples=1)
+    enrolment = Enrolment(second, "cut", other, examples=1)
     other.backslash()
     assert enrolment.line()["kept"] is True
     assert enrolment.line()["enrolled"] == "cut"
@@ -270,29 +292,20 @@ def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: B
     path = tmp_path / "mine.json"
     path.write_text('{"format": 1, "gestures": {"slash": [{"shape": [3]}]}}')
     daemon = begin("--own-gestures", path)
-    ready(daemon)  # which performs a swipe
+    sensor = ready(daemon)  # which performs a swipe
     fault = daemon.ask("gestures")["own"]["fault"]
     assert str(path) in fault
     assert "gestures.slash[0]" in fault
     with pytest.raises(Refused, match="is no file of own gestures"):
-        Enrolment(daemon, "cut")
+        Enrolment(daemon, "cut", sensor)
     assert any(line.get("what") == fault for line in lines_of(daemon.stderr()))
     assert '"shape": [3]' in path.read_text()
 
 
-@pytest.mark.parametrize(
-    ("flags", "env", "words"),
-    [
-        (("--own-gestures", "/proc/own-gestures.json"), {}, r"/proc/own-gestures\.json: cannot be written"),
-        (("--own-gestures", f"/{'a' * 256}/own.json"), {}, r"own\.json: cannot be read: File name too long"),
-        ((), {"STATE_DIRECTORY": "", "XDG_STATE_HOME": "", "HOME": ""}, "no home: .*--own-gestures FILE"),
-    ],
-)
-def test_where_it_cannot_be_written_nothing_changes(begin: Begin, flags, env: dict[str, str], words: str) -> None:
-    daemon = begin(*flags, **({"env": env} if env else {}))
-    ready(daemon)
-    with pytest.raises(Refused, match=words):
-        Enrolment(daemon, "slash", examples=1)
+def test_where_it_cannot_be_written_nothing_changes(begin: Begin) -> None:
+    daemon = begin(env={"STATE_DIRECTORY": "", "XDG_STATE_HOME": "", "HOME": ""})
+    with pytest.raises(Refused, match="no home: .*--own-gestures FILE"):
+        Enrolment(daemon, "slash", ready(daemon), examples=1)
     assert daemon.ask("gestures")["own"]["gestures"] == {}
 
 
@@ -309,28 +322,27 @@ def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
     assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"slash"}
 
 
-def test_another_model_takes_the_examples_over_or_says_that_they_are_off(begin: Begin, model: Path) -> None:
-    daemon = begin()
+def test_another_model_takes_the_examples_over_or_says_that_they_are_off(daemon: Daemon) -> None:
     sensor = ready(daemon)
     enrol(daemon, sensor)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
-    tiny_model.make(model, version="2")
+    tiny_model.make(daemon.folder / MODEL, version="2")
     daemon.ask("reload")
     assert daemon.ask("gestures")["own"]["off"] == "tiny has no embedding"
     assert answer(client, sensor, sensor.slash)["type"] == "unknown"
     with pytest.raises(Refused, match="own gestures are off"):
-        Enrolment(daemon, "cut")
-    tiny_model.make(model, version="3", own=tiny_model.own())
+        Enrolment(daemon, "cut", sensor)
+    tiny_model.make(daemon.folder / MODEL, version="3", own=tiny_model.own())
     daemon.ask("reload")
     own = daemon.ask("status")["own"]
     assert (own["off"], own["gestures"]) == (None, {"slash": 2})
     assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
 
 
-def test_thresholds_refractory_times_tests_and_filters_take_own_names(begin: Begin, tmp_path: Path) -> None:
-    config = tmp_path / "gestured.toml"
+def test_thresholds_refractory_times_tests_and_filters_take_own_names(daemon: Daemon) -> None:
+    config = daemon.folder / CONFIG
     config.write_text("[gestures.slash]\nrefractory_s = 60\n")
-    daemon = begin("--config", config)
+    daemon.ask("reload")
     sensor = ready(daemon)
     enrol(daemon, sensor)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled", gestures=["slash"])
@@ -347,10 +359,8 @@ def test_thresholds_refractory_times_tests_and_filters_take_own_names(begin: Beg
         daemon.ask("reload")
 
 
-def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(begin: Begin, tmp_path: Path) -> None:
-    config = tmp_path / "gestured.toml"
-    config.write_text("")
-    daemon = begin("--config", config)
+def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(daemon: Daemon) -> None:
+    config = daemon.folder / CONFIG
     sensor = ready(daemon)
     config.write_text('[arming]\nby = "slash"\n')
     with pytest.raises(Refused, match="arming.by = 'slash': is no gesture in use, expected any of"):

@@ -90,6 +90,21 @@ def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: 
     assert own_file.where(Path("mine.json"), environ) == Path("mine.json")
 
 
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("/proc/own-gestures.json", "/proc/own-gestures.json: cannot be written: "),
+        (f"/{'a' * 256}/own.json", "/own.json: cannot be read: File name too long"),
+    ],
+)
+def test_where_it_cannot_be_written_or_read_that_is_said(path: str, words: str) -> None:
+    keeper = Keeper(Path(path))
+    keeper.read()
+    assert words in str(keeper.fault)
+    with pytest.raises(OwnFileError, match="cannot be written"):
+        keeper.hold()
+
+
 def test_a_folder_into_which_we_may_not_look_is_a_fault_of_the_file(tmp_path: Path, nobody) -> None:
     """As where a service's account was left the HOME of root."""
     tmp_path.chmod(0o700)
