@@ -1,6 +1,6 @@
 """The bridges' own socket of a real daemon: each closes and opens gates in its own name, and can do nothing else."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +16,23 @@ from tests.core.test_hub import GESTURES, Sure
 from tests.daemon.harness import Daemon, Sensor
 
 
+@pytest.fixture(scope="module")
+def lasting(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    folder = tmp_path_factory.mktemp("gates")
+    config = folder / "gestured.toml"
+    config.write_text(f'[sensors.armrest]\n[gates]\nstart = ["seat"]\nsocket = "{folder}/gates.sock"\n')
+    daemon = Daemon.start(folder, model, "--config", config, "--clock", "sensor", "--stale-s", 30)
+    yield daemon
+    daemon.stop()
+
+
 @pytest.fixture
-def daemon(start: Callable[..., Daemon], tmp_path: Path) -> Daemon:
-    config = tmp_path / "gestured.toml"
-    config.write_text(f'[sensors.armrest]\n[gates]\nstart = ["seat"]\nsocket = "{tmp_path}/gates.sock"\n')
-    return start("--config", config, "--clock", "sensor", "--stale-s", 30)
+def daemon(lasting: Daemon) -> Iterator[Daemon]:
+    """A daemon whose gate "seat" alone is closed."""
+    yield lasting
+    for gate in lasting.ask("status")["gates"]:
+        lasting.ask("allow", gate=gate)
+    lasting.ask("inhibit", gate="seat")
 
 
 @pytest.fixture
