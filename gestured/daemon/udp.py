@@ -287,10 +287,8 @@ class Receiver:
         if self._hub.looks and self._foreseeing is None:
             self._foreseeing = self._loop.call_soon(self._foresee)
         if self._hub.due != self._due and not self._backlog:
+            self._forget_alarm()
             self._due = self._hub.due
-            if self._alarm is not None:
-                self._alarm.cancel()
-                self._alarm = None
             if self._due < math.inf:
                 woken = self._due - EARLY_S if self._sparse else self._due + EARLY_S
                 self._alarm = self._loop.call_later(max(woken - self._clock(), 0.0), self._wait)
@@ -302,8 +300,13 @@ class Receiver:
         else:
             self.read()
             self._desk.take(self._hub.wait(self.served))
-            self._due = math.inf
+            self._forget_alarm()  # of what the packets that were just read began, and that is decided by now, too
             self._expect()
+
+    def _forget_alarm(self) -> None:
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self._due, self._alarm = math.inf, None
 
     def _count_drops(self, now: float) -> None:
         """Tell the hub that the kernel has dropped packets since the last look, and whether that makes a flood."""

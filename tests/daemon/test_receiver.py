@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gestured.core.owner import Source
@@ -215,21 +215,26 @@ def sensors(count: int, frames: int) -> list[Sent]:
     return [(0.01 + n / 15 + k / 100, b"%d" % n, ("10.0.0.1", k)) for n in range(frames) for k in range(count)]
 
 
-@settings(max_examples=50, deadline=None)
-@given(st.sets(st.integers(0, 6000), max_size=4), st.sampled_from([3e-6, 2e-4]))
+@settings(max_examples=40, deadline=None)
+@given(st.sets(st.integers(0, 1500), max_size=4), st.sampled_from([3e-6, 2e-4]))
+@example({900}, 2e-4)  # what is due is decided by packets that are found then
 def test_wherever_it_stands_still_all_that_arrived_is_served_and_no_frame_moves(stops: set[int], cost_s: float) -> None:
     """A stranger's rubbish lies before the frames, more than a read takes, and a stop may begin at any moment."""
-    rubbish = [(t + n * 1e-6, RUBBISH * 100, ("10.0.0.9", 1)) for t in (0.5, 1.5, 2.5) for n in range(1000)]
-    machine = Machine([*sensors(4, 60), *rubbish], lambda packet: cost_s, stops)
+    rubbish = [(t + n * 1e-6, RUBBISH * 100, ("10.0.0.9", 1)) for t in (0.5, 1.5) for n in range(400)]
+    machine = Machine([*sensors(4, 40), *rubbish], lambda packet: cost_s, stops)
     machine.due_s = 0.1
+    turns = 0
 
     def look(receiver: Receiver) -> None:
+        nonlocal turns
+        turns += 1
+        assert turns < 5000, "the loop comes round without end though nothing is to be done"
         machine.clock()  # where it may stand still, too
         waiting = [times[0] for times in machine.waiting.values()]
         assert receiver.served <= min(waiting, default=machine.now) + 1e-6  # s; the kernel counts nanoseconds
         assert waiting or receiver.served > machine.now - STOP_S * (len(stops) + 1)
 
-    run(machine, 8.0, look)
+    run(machine, 7.0, look)
     assert len(machine.served) == machine.admitted
     assert machine.moved_s < TOGETHER_S  # packets that arrived together have one time
 
@@ -269,7 +274,7 @@ def test_what_the_way_held_up_is_taken_at_once_and_others_do_not_wait_for_it(apa
     assert [len(some) for some in taken if len(some) > 1] == [4] * 3 and sum(taken, []) == list(range(90))
 
 
-@pytest.mark.parametrize("ports", [1, 20, 58])
+@pytest.mark.parametrize("ports", [1, 58])
 @pytest.mark.parametrize(("cost_s", "burst"), [(0.002, 1), (0.012, 1), (0.012, 50)])
 def test_while_owners_send_full_packets_nobody_else_loses_one(ports: int, cost_s: float, burst: int) -> None:
     """They come one at a time, so that a read finds few, or many at once; each costs as much as several turns."""
@@ -297,54 +302,52 @@ class Learns(Machine):
     """A machine on which a sensor's first frames are dear, and later ones cheap where several are served together."""
 
     def __init__(self, sent: Iterable[Sent]) -> None:
-        super().__init__(sent, lambda packet: 2e-5)
+        super().__init__(sent, lambda packet: 6e-5)
         self.seen: Counter[bytes] = Counter()
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
         known = sum(self.seen[packet] >= 15 for packet, _ in packets)
-        self.work(7e-4 * (len(packets) - known) + 5e-4 * (known > 0))
+        self.work(2.1e-3 * (len(packets) - known) + 1.5e-3 * (known > 0))
         self.seen.update(packet for packet, _ in packets)
         return super().receive(packets, now)
 
 
-@pytest.mark.parametrize("ports", [1, 20, 600])
+@pytest.mark.parametrize("ports", [1, 200])
 def test_many_sensors_are_followed_again_once_they_are_known(ports: int) -> None:
     """Until then they come to six times the work that there is time for, and later to a third of it.
 
     One by one they would still come to five times of it.
     """
     frames = [
-        (0.01 + n / 15 + k / 9000, b"%3d" % k * 130, ("10.0.0.1", k % ports)) for n in range(165) for k in range(600)
+        (0.01 + n / 15 + k / 3000, b"%3d" % k * 130, ("10.0.0.1", k % ports)) for n in range(165) for k in range(200)
     ]
     machine = Learns(frames)
-    machine.each = 600 // ports
+    machine.each = 200 // ports
     run(machine, 11.5)
-    assert set(Counter(packet for packet, _ in machine.served[-2 * 9000 :]).values()) == {30}
+    assert set(Counter(packet for packet, _ in machine.served[-2 * 3000 :]).values()) == {30}
 
 
-@pytest.mark.parametrize("look_s", [0.0003, 0.0015, 0.012])
+def many(seconds: float, *, looks: bool = False, look_s: float = 0.0, asks: int = 0) -> Machine:
+    """A machine that has served eighty sensors for so long, beside contacts to look at and segments to name."""
+    machine = Machine(sensors(80, round(15 * (seconds - 1))), lambda packet: 2e-4)
+    machine.looks, machine.look_s, machine.asks = looks, look_s, asks
+    run(machine, seconds)
+    assert len(machine.served) == machine.admitted
+    return machine
+
+
+@pytest.mark.parametrize("look_s", [0.0003, 0.012])
 def test_provisional_events_take_a_third_of_the_time_and_no_packet_waits_for_two_of_them(look_s: float) -> None:
     """However many contacts there are to look at."""
-    latest, seconds = [], 6.0
-    for looks in (False, True):
-        machine = Machine(sensors(80, 75), lambda packet: 2e-4)
-        machine.looks, machine.look_s = looks, look_s
-        run(machine, seconds)
-        latest.append(machine.latest_s)
-        assert len(machine.served) == 80 * 75
-    assert latest[1] < latest[0] + 2 * look_s
-    assert 0.1 * seconds < machine.looked_s < seconds / 3
+    machine = many(4.0, looks=True, look_s=look_s)
+    assert machine.latest_s < many(4.0).latest_s + 2 * look_s
+    assert 0.1 * 4.0 < machine.looked_s < 4.0 / 3
 
 
 def test_of_segments_that_are_shown_together_each_gets_its_name_and_no_packet_waits_for_two_of_them() -> None:
-    machine = Machine(sensors(80, 75), lambda packet: 2e-4)
-    machine.look_s = 0.001
-    run(machine, 6.0)
-    quiet, machine = machine.latest_s, Machine(sensors(80, 75), lambda packet: 2e-4)
-    machine.look_s, machine.asks = 0.001, 40
-    run(machine, 6.0)
+    machine = many(4.0, asks=40, look_s=0.001)
     assert machine.asks == 0
-    assert machine.latest_s < quiet + 2 * machine.look_s
+    assert machine.latest_s < many(4.0).latest_s + 2 * 0.001
 
 
 @pytest.mark.parametrize(("apart_s", "most_s"), [(1 / 15, 0.0002), (0.008, 0.0022)])
