@@ -36,7 +36,6 @@ def count(daemon: Daemon, what: str) -> int:
 
 SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "minimal": ((), {}),
-    "metrics": (("--metrics", "127.0.0.1:0"), {}),
     "all but OSC out": (("--metrics", "127.0.0.1:0", "--flight-recorder", "1"), {}),
     "OSC out": (("--publish", "osc://127.0.0.1:9"), {}),
     "forest only": ((), {"model": "touch_pattern_rf"}),
@@ -91,7 +90,7 @@ def test_python_osc_comes_with_osc_output_alone(used: Used) -> None:
 
 def test_the_metrics_library_comes_with_the_first_scrape(used: Used) -> None:
     assert "prometheus_client" not in imported(used("OSC out"))
-    daemon = used("metrics")
+    daemon = used("all but OSC out")
     assert "prometheus_client" not in imported(daemon)
     daemon.get("/metrics")
     assert "prometheus_client" in imported(daemon)
