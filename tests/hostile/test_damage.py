@@ -53,28 +53,37 @@ def gestures(lines: list[dict[str, Any]], after: float) -> list[tuple[str, float
 
 
 @pytest.fixture(scope="module")
-def expected(bench: damage.Bench, somebody: Take) -> list[str]:
+def good(somebody: Take) -> list[tuple[float, bytes]]:
+    """What arrives without a fault."""
+    return damage.damage(Fault(), somebody, 1).arrivals
+
+
+@pytest.fixture(scope="module")
+def expected(bench: damage.Bench, good: list[tuple[float, bytes]]) -> list[str]:
     """What is said late in a session without a fault."""
-    found = gestures(bench.events(damage.damage(Fault(), somebody, 1).arrivals), AGAIN_S)
+    found = gestures(bench.events(good), AGAIN_S)
     assert len(found) >= 4
     return [label for label, _ in found]
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_what_comes_after_the_fault_counts(bench: damage.Bench, somebody: Take, expected: list[str], name: str) -> None:
+def test_what_comes_after_the_fault_counts(
+    bench: damage.Bench, somebody: Take, good: list[tuple[float, bytes]], expected: list[str], name: str
+) -> None:
     damaged = damage.damage(FAULTS[name], somebody, 1)
     bad = [arrival for arrival in damaged.arrivals if arrival[0] < HEALED_S]
-    good = damage.damage(Fault(), somebody, 1).arrivals
     stalls = [stall for stall in damaged.stalls if stall[1] < HEALED_S]
     healed = bench.events(bad + [arrival for arrival in good if arrival[0] >= HEALED_S], stalls)
     assert [label for label, _ in gestures(healed, AGAIN_S)] == expected
     assert violations(healed) == []
 
 
-def test_a_stall_of_the_daemon_changes_no_event(bench: damage.Bench, somebody: Take) -> None:
+def test_a_stall_of_the_daemon_changes_no_event(
+    bench: damage.Bench, somebody: Take, good: list[tuple[float, bytes]]
+) -> None:
     """Whenever it stands still: what the kernel's buffer held counts as if it had been read at once."""
-    healthy = bench.events(damage.damage(Fault(), somebody, 1).arrivals)
-    for seed in range(5):
+    healthy = bench.events(good)
+    for seed in range(3):
         damaged = damage.damage(FAULTS["the daemon stalls for 1 s"], somebody, seed)
         assert len(damaged.struck) > 40
         assert bench.events(damaged.arrivals, damaged.stalls) == healthy

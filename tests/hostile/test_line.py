@@ -6,7 +6,7 @@ import pytest
 
 from tests.hostile.line import Impairment, Line, Proxy
 
-SENT = [(i / 15, b"/arm/pressure %06d" % i) for i in range(8_000)]
+SENT = [(i / 15, b"/arm/pressure %06d" % i) for i in range(4_000)]
 
 
 def through(impairment: Impairment, seed: int = 1) -> list[list[tuple[float, bytes]]]:

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -9,11 +10,19 @@ import pytest
 from gestured.bridge.counts import HELP
 from tests.hostile.faults import FAULTS
 
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 TESTS = Path(__file__).parents[1]
 TEXT = (TESTS.parent / "docs" / "reliability.md").read_text()
 METRICS = {*re.findall(r"^# TYPE (\S+)", (TESTS / "daemon" / "metrics.txt").read_text(), re.MULTILINE)}
 METRICS |= {f"gestured_bridge_{name}{'' if name == 'connected' else '_total'}" for name in HELP}
 ROWS = [line for line in TEXT.split("\n## ")[0].splitlines() if line.startswith("| ") and "| fault |" not in line]
+
+
+@cache
+def functions(file: str) -> dict[str, bool]:
+    """The functions of a file by name, and whether each is a slow test."""
+    found = [one for one in ast.parse((TESTS / file).read_text()).body if isinstance(one, FUNCTIONS)]
+    return {one.name: any("mark.hostile" in ast.unparse(mark) for mark in one.decorator_list) for one in found}
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row[2:40] for row in ROWS])
@@ -23,9 +32,7 @@ def test_each_fault_has_a_promise_a_test_and_a_metric(row: str) -> None:
     names = re.findall(r"`([a-z_/]+\.py)::(\w+)`( \(slow\))?", tests)
     assert names
     for file, name, slow in names:
-        found = [node for node in ast.parse((TESTS / file).read_text()).body if getattr(node, "name", "") == name]
-        assert isinstance(found[0], ast.FunctionDef | ast.AsyncFunctionDef), name
-        assert bool(slow) == any("mark.hostile" in ast.unparse(mark) for mark in found[0].decorator_list), name
+        assert functions(file)[name] == bool(slow), name
     for metric in re.findall(r"`(gestured_\w+)`", metrics):
         assert metric in METRICS
 

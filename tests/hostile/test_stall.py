@@ -17,7 +17,7 @@ def check(result: Result) -> None:
 
 def test_a_stall_of_a_second_changes_no_answer(start) -> None:
     daemon = start("--metrics", "127.0.0.1:0", model="cnn_lstm")
-    check(play(daemon, 20, 15.0, 1.0, 8.0))
+    check(play(daemon, 20, 15.0, 1.0, 6.0))
 
 
 @pytest.mark.hostile
