@@ -119,9 +119,8 @@ def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp
     assert daemon.ask("emit", gesture="one_tap", sensor="arm")["sequence"] == 3
 
 
-def test_recalibration_is_refused_while_touched(start) -> None:
-    daemon = start("--clock", "sensor", *SLOW)
-    client = daemon.client().subscribe("onset", "gesture", "unknown")
+def test_recalibration_is_refused_while_touched(daemon: Daemon) -> None:
+    client = daemon.client().subscribe("onset", "gesture", "unknown", sensors=["arm"])
     sensor = Sensor(daemon, "arm").begin()
     sensor.send([sensor.hand.frame(4.0) for _ in range(5)])
     client.events("onset", "arm")
@@ -153,7 +152,7 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
         assert control.ask("status")["gates"] == []
 
 
-def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
+def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, shared: Daemon) -> None:
     client = daemon.client()
     Sensor(daemon, "flown").begin().perform("left")
     client.events("gesture", "flown")
@@ -167,7 +166,7 @@ def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
     assert len(lines) == answer["lines"]
     assert sum(line["type"] == "packet" for line in lines) >= 2 * 15 + 7
     assert "swipe_left" in {line.get("gesture") for line in lines}
-    with start().control() as control, pytest.raises(Refused, match="flight_recorder"):
+    with shared.control() as control, pytest.raises(Refused, match="flight_recorder"):
         control.ask("flight")
 
 

@@ -62,14 +62,6 @@ def test_lists_are_written_with_commas_or_repeated() -> None:
     assert settings.gestures == ("one_tap", "swipe_left")
 
 
-def test_a_subset_and_thresholds_stand_side_by_side_in_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "gestured.toml"
-    path.write_text('[gestures]\nuse = ["one_tap"]\n[gestures.one_tap]\nthreshold = 0.9\nrefractory_s = 1\n')
-    settings, _ = load_settings({"config": str(path)}, {})
-    assert settings.gestures == ("one_tap",)
-    assert settings.per_gesture["one_tap"].threshold == 0.9 and settings.per_gesture["one_tap"].refractory_s == 1
-
-
 def test_the_allow_list_knows_mapped_and_scoped_addresses() -> None:
     lan = (ipaddress.ip_network("192.168.7.0/24"), ipaddress.ip_network("fe80::/10"))
     scene = Scene(("one_tap",), (9, 9), allow=lan)

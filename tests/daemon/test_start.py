@@ -189,66 +189,62 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
 
 
 @pytest.mark.parametrize(
-    ("flags", "env", "file", "said"),
+    ("file", "said"),
     [
-        (("--listen", "here"), {}, "", ("listen", "'here'", "HOST:PORT", "command line")),
-        (("--listen", f"{'a' * 64}:9000"), {}, "", ("listen", "HOST:PORT", "1 to 63 characters")),
-        (("--publish", "osc://a..b:9000"), {}, "", ("publish.0", "'osc://a..b:9000'", "HOST:PORT")),
-        ((), {}, 'listen = "a\\u0000b:9000"', ("listen", "expected HOST:PORT")),
-        ((), {"GESTURED_STALE_S": "soon"}, "", ("stale_s", "'soon'", "number", "environment")),
-        ((), {"GESTURED_SOCKETT": "/x"}, "", ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
-        ((), {"GESTURED_METRICS_PORT": "9108"}, "", ("GESTURED_METRICS_PORT", "GESTURED_METRICS")),
-        ((), {}, "modell = 'x'", ("modell", "did you mean model", "gestured.toml")),
-        ((), {}, "[gestures.one_tap]\nthreshold = true", ("gestures.one_tap.threshold = True", "expected a number")),
-        (
-            (),
-            {},
-            "[sensors.arm]\nrotate = 45",
-            ("sensors.arm.rotate", "45", "0, 90, 180 or 270", "gestured.toml"),
-        ),
-        (
-            (),
-            {},
-            "[gestures.one_tap]\nthreshold = 2",
-            ("gestures.one_tap.threshold", "2", "less than or equal to 1"),
-        ),
-        ((), {}, "[sensors.'arm rest']", ("'arm rest'", "expected a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")),
-        ((), {}, "[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
-        (("--strictness", "lax"), {}, "", ("strictness", "'lax'", "'eager', 'normal' or 'strict'", "command line")),
-        ((), {}, "[sensors.arm.arming]\nby = 'a'\nsecond = 3", ("sensors.arm.arming.second", "did you mean seconds")),
-        (
-            (),
-            {},
-            "[sensors.arm.zones.a]\nat = [0, 0, 1, 1]\ngesture = []",
-            ("zones.a.gesture", "did you mean gestures?"),
-        ),
-        ((), {}, f"[sensors.arm.zones]\n{TWO}", ("sensors.arm", "zones.a at", "zones.b at", "overlap, expected")),
-        ((), {}, 'socket = "/tmp/\\u0000"', ("socket", "expected the path of a Unix socket")),
-        (("--own-gestures", "/"), {}, "", ("own_gestures", "'/'", "expected the path of a file")),
-        ((), {}, "[gestures]\nuse = 5", ("gestures.use = 5", "gestured.toml", "expected a list")),
-        ((), {}, "[gates]\nsocket = 5", ("gates.socket = 5", "gestured.toml", "path of a Unix socket")),
-        ((), {}, "[gates]\nstart = 'door'", ("gates.start = 'door'", "expected a list")),
-        ((), {}, "[arming]\nby = 5", ("arming.by = 5", "expected a text")),
-        ((), {}, "[arming]\nby = 'a'\nseconds = '3'", ("arming.seconds = '3'", "gestured.toml", "expected a number")),
-        ((), {}, "stale_s = '3'", ("stale_s = '3'", "gestured.toml", "expected a number")),
-        ((), {}, "max_sensors = '3'", ("max_sensors = '3'", "gestured.toml", "expected a whole number")),
-        ((), {}, "sensors.arm.mirror = 'true'", ("sensors.arm.mirror = 'true'", "expected true or false")),
-        ((), {}, "sensors.arm.zones.a.at = ['0', 0, 1, 1]", ("sensors.arm.zones.a.at.0 = '0'", "expected a number")),
-        ((), {}, "sensors.arm.zones.a.at = [0, 0, 1, true]", ("sensors.arm.zones.a.at.3 = True", "expected a number")),
-        ((), {}, "sensors = 5", ("sensors = 5", "expected a table [sensors]")),
-        (("--touch", "maybe"), {}, "", ("touch = 'maybe'", "expected true or false")),
-        (("--max-sensors", "1.5"), {}, "", ("max_sensors = '1.5'", "expected a whole number")),
-        ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
-        ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
-        ((), {}, f"stale_s = {'1' * 5000}", ("gestured.toml", "TOML", "4300 digits")),
-        (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),
+        ('listen = "a\\u0000b:9000"', ("listen", "expected HOST:PORT")),
+        ("modell = 'x'", ("modell", "did you mean model", "gestured.toml")),
+        ("[gestures.one_tap]\nthreshold = true", ("gestures.one_tap.threshold = True", "expected a number")),
+        ("[sensors.arm]\nrotate = 45", ("sensors.arm.rotate", "45", "0, 90, 180 or 270", "gestured.toml")),
+        ("[gestures.one_tap]\nthreshold = 2", ("gestures.one_tap.threshold", "2", "less than or equal to 1")),
+        ("[sensors.'arm rest']", ("'arm rest'", "expected a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")),
+        ("[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
+        ("[sensors.arm.arming]\nby = 'a'\nsecond = 3", ("sensors.arm.arming.second", "did you mean seconds")),
+        ("[sensors.arm.zones.a]\nat = [0, 0, 1, 1]\ngesture = []", ("zones.a.gesture", "did you mean gestures?")),
+        (f"[sensors.arm.zones]\n{TWO}", ("sensors.arm", "zones.a at", "zones.b at", "overlap, expected")),
+        ('socket = "/tmp/\\u0000"', ("socket", "expected the path of a Unix socket")),
+        ("[gestures]\nuse = 5", ("gestures.use = 5", "gestured.toml", "expected a list")),
+        ("[gates]\nsocket = 5", ("gates.socket = 5", "gestured.toml", "path of a Unix socket")),
+        ("[gates]\nstart = 'door'", ("gates.start = 'door'", "expected a list")),
+        ("[arming]\nby = 5", ("arming.by = 5", "expected a text")),
+        ("[arming]\nby = 'a'\nseconds = '3'", ("arming.seconds = '3'", "gestured.toml", "expected a number")),
+        ("stale_s = '3'", ("stale_s = '3'", "gestured.toml", "expected a number")),
+        ("max_sensors = '3'", ("max_sensors = '3'", "gestured.toml", "expected a whole number")),
+        ("sensors.arm.mirror = 'true'", ("sensors.arm.mirror = 'true'", "expected true or false")),
+        ("sensors.arm.zones.a.at = ['0', 0, 1, 1]", ("sensors.arm.zones.a.at.0 = '0'", "expected a number")),
+        ("sensors.arm.zones.a.at = [0, 0, 1, true]", ("sensors.arm.zones.a.at.3 = True", "expected a number")),
+        ("sensors = 5", ("sensors = 5", "expected a table [sensors]")),
+        ("max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
+        ("listen = !", ("gestured.toml", "TOML", "line 1")),
+        (f"stale_s = {'1' * 5000}", ("gestured.toml", "TOML", "4300 digits")),
     ],
 )
-def test_settings_that_are_not_valid(tmp_path: Path, flags, env, file, said) -> None:
+def test_a_file_that_is_not_valid(tmp_path: Path, file: str, said: tuple[str, ...]) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(file)
-    where = () if "--config" in flags else ("--config", config)
-    text = unread("--model", "tiny", *where, *flags, env=env)
+    text = unread("--config", config)
+    assert all(word in text for word in said), text
+
+
+@pytest.mark.parametrize(
+    ("flags", "env", "said"),
+    [
+        (("--listen", "here"), {}, ("listen", "'here'", "HOST:PORT", "command line")),
+        (("--listen", f"{'a' * 64}:9000"), {}, ("listen", "HOST:PORT", "1 to 63 characters")),
+        (("--publish", "osc://a..b:9000"), {}, ("publish.0", "'osc://a..b:9000'", "HOST:PORT")),
+        ((), {"GESTURED_STALE_S": "soon"}, ("stale_s", "'soon'", "number", "environment")),
+        ((), {"GESTURED_SOCKETT": "/x"}, ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
+        ((), {"GESTURED_METRICS_PORT": "9108"}, ("GESTURED_METRICS_PORT", "GESTURED_METRICS")),
+        (("--strictness", "lax"), {}, ("strictness", "'lax'", "'eager', 'normal' or 'strict'", "command line")),
+        (("--own-gestures", "/"), {}, ("own_gestures", "'/'", "expected the path of a file")),
+        (("--touch", "maybe"), {}, ("touch = 'maybe'", "expected true or false")),
+        (("--max-sensors", "1.5"), {}, ("max_sensors = '1.5'", "expected a whole number")),
+        (("--config", "/no/such/file"), {}, ("config", "/no/such/file")),
+    ],
+)
+def test_flags_and_variables_that_are_not_valid(
+    flags: tuple[str, ...], env: dict[str, str], said: tuple[str, ...]
+) -> None:
+    text = unread(*flags, env=env)
     assert all(word in text for word in said), text
 
 
@@ -321,7 +317,7 @@ def test_a_configuration_that_is_no_small_file(tmp_path: Path, what: str) -> Non
     else:
         path.touch()
         os.truncate(path, 300 << 20)
-    text = unread("--model", "tiny", "--config", path)
+    text = unread("--config", path)
     assert f"config: {path}" in text and "expected a regular file of at most 1 MiB" in text
 
 
