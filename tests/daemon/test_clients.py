@@ -15,11 +15,13 @@ from gestured.daemon import client as one_client
 from gestured.daemon import clients
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
+from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 
 
-def test_a_slow_client_is_told_what_it_lost_and_others_get_everything(start) -> None:
-    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
+def test_a_slow_client_is_told_what_it_lost_and_others_get_everything(start, tmp_path: Path) -> None:
+    long = tiny_model.make(tmp_path / "long.onnx", gestures=tuple(f"{name:_<64}" for name in tiny_model.GESTURES))
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=long)  # of few lines as many bytes
     slow = daemon.client()
     slow.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     quick = daemon.client()

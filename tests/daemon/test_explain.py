@@ -38,13 +38,13 @@ def waited(tap_gap_s: float, seed: int) -> float:
     raise AssertionError("no answer")
 
 
-@pytest.mark.parametrize("tap_gap_s", [0.2, 0.25, 0.3, 0.4, 0.45, 0.5, 0.6])
+@pytest.mark.parametrize("tap_gap_s", [0.2, 0.3, 0.45, 0.6])
 def test_a_tap_is_answered_when_explain_says(tap_gap_s: float) -> None:
     if not shipped()["cnn_lstm"].exists():
         pytest.skip("the shipped models are not there")
     text = explain(*settings_of("--tap-gap-s", tap_gap_s))
     (said,) = re.findall(r"at 15 Hz .* a tap ([0-9.]+) s after it", text)
-    assert [waited(tap_gap_s, seed) for seed in range(12)] == [pytest.approx(float(said), abs=3 * JITTER_S)] * 12
+    assert [waited(tap_gap_s, seed) for seed in range(4)] == [pytest.approx(float(said), abs=3 * JITTER_S)] * 4
 
 
 def test_the_file_of_own_gestures_is_said_and_why_the_daemon_goes_on_without_one(
