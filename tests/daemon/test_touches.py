@@ -12,7 +12,7 @@ import pytest
 from gestured.core.events import Touch
 from gestured.core.messages import Subscription
 from gestured.daemon.client import BACKLOG_BYTES
-from tests.daemon.harness import Client, Sensor
+from tests.daemon.harness import Client, Daemon, Sensor
 from tests.daemon.test_clients import connect, heard, listener, serve, turn  # noqa: F401 - a fixture among them
 
 FOLLOWS = Subscription(types=frozenset(("touch",)))
@@ -29,8 +29,8 @@ def upto(client: Client, kind: str) -> list[dict[str, Any]]:
     return client.until(lambda line: line.get("phase", line["type"]) == kind)
 
 
-def test_it_is_off_unless_the_configuration_has_it(start) -> None:
-    client = start("--clock", "sensor").client().ask({"subscribe": {"types": ["touch"]}})
+def test_it_is_off_unless_the_configuration_has_it(shared: Daemon) -> None:
+    client = shared.client().ask({"subscribe": {"types": ["touch"]}})
     expected = 'subscribe.types: "touch" is off, expected `touch = true` in the configuration'
     assert client.line() == {"type": "error", "reason": expected}
 

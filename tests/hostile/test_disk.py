@@ -48,14 +48,16 @@ def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daem
     assert client.line()["gesture"] == "swipe_left"
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
-def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypatch, number: int) -> None:
+def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "a.mcap"
-    with pytest.raises(RecordingError, match=os.strerror(number)), tape_writer.Writer(path, SCENE, 1 << 30) as writer:
+    with (
+        pytest.raises(RecordingError, match=os.strerror(errno.EIO)),
+        tape_writer.Writer(path, SCENE, 1 << 30) as writer,
+    ):
         writer.packet(1, "127.0.0.1:1", b"one")
         writer.flush()
         writer.packet(2, "127.0.0.1:1", b"two")
-        monkeypatch.setattr(os, "fsync", refuses(number))
+        monkeypatch.setattr(os, "fsync", refuses(errno.EIO))
         writer.flush()
     assert tape_reader.read(path).packets[0].data == b"one"
 
@@ -73,13 +75,12 @@ def test_a_tape_for_which_there_is_no_room_at_all_leaves_no_file(tmp_path: Path,
     assert not path.exists()
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
-def test_a_recording_is_written_whole_or_the_old_one_stays(tmp_path: Path, monkeypatch, number: int) -> None:
+def test_a_recording_is_written_whole_or_the_old_one_stays(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "a.npz"
     recording.write(path, example())
     before = path.read_bytes()
-    monkeypatch.setattr(os, "fsync", refuses(number))
-    with pytest.raises(RecordingError, match=rf"a\.npz: cannot be written: {os.strerror(number)}"):
+    monkeypatch.setattr(os, "fsync", refuses(errno.ENOSPC))
+    with pytest.raises(RecordingError, match=rf"a\.npz: cannot be written: {os.strerror(errno.ENOSPC)}"):
         recording.write(path, example())
     assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
 
