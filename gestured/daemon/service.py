@@ -19,7 +19,7 @@ from gestured.daemon.clients import EventServer
 from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
 from gestured.daemon.gatekeeper import Gatekeeper
-from gestured.daemon.health import TICK_S, watchdog_period
+from gestured.daemon.health import TICK_S, Canary, watchdog_period
 from gestured.daemon.keeper import Keeper
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
@@ -124,6 +124,7 @@ class Service:
         """Look after the timers until `stop` is set; then finish what is in flight."""
         parts = self.parts
         watchdog = watchdog_period()
+        canary = Canary(parts.desk)
         period = min(TICK_S, watchdog or TICK_S)
         status_at = time.monotonic()
         due = status_at
@@ -135,7 +136,7 @@ class Service:
             if now >= status_at:
                 status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
                 self._every_second()
-            if watchdog:
+            if watchdog and canary.sings():
                 notify("WATCHDOG=1")
             if reload.is_set() and not self._reloading.locked():
                 reload.clear()

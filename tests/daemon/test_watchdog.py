@@ -10,7 +10,10 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
+from gestured.core.front_end import FrontEnd
+from gestured.daemon.health import Canary
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.parts import Parts
 
 ROOT = Path(__file__).resolve().parents[2]
 HANGING = """
@@ -77,6 +80,17 @@ def test_what_ends_a_hang_finds_out_where_it_hung(start, hanging) -> None:
     assert daemon.wait() == -signal.SIGABRT
     os.close(pipe)
     assert "sitecustomize.py" in daemon.stderr() and "in classify" in daemon.stderr()
+
+
+def test_the_canary_says_when_the_way_of_a_frame_is_broken(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = Parts(model)
+    metrics, canary = parts.metrics, Canary(parts.desk)
+    assert all(canary.sings() for _ in range(50)) and metrics.internal_errors.total() == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(FrontEnd, "push", lambda self, frame: 1 / 0)
+        assert not canary.sings()
+    assert metrics.internal_errors.total() == 1
+    assert canary.sings()
 
 
 def test_signals_that_come_again_while_it_ends_do_not_make_it_a_crash(start) -> None:
