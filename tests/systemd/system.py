@@ -207,6 +207,21 @@ def test_a_configuration_that_is_refused_at_the_start_is_not_tried_for_ever(box:
     box.run("gesturectl", "status")
 
 
+def test_an_address_that_comes_late_is_waited_for(box: Container):
+    box.path(CONFIGURATION).write_text('listen = "192.168.8.2:9000"\n')
+    box.run("systemctl", "start", "gestured-standalone", check=False)  # it stops the service that is activated
+    try:
+        tried = ("systemctl", "show", "-P", "NRestarts", "gestured-standalone")
+        wait("another start", lambda: int(box.run(*tried).stdout) >= 2)
+        box.run("ip", "address", "add", "192.168.8.2/32", "dev", "lo")
+        wait("the daemon", lambda: box.run("gesturectl", "status", check=False).returncode == 0)
+    finally:
+        box.run("systemctl", "stop", "gestured-standalone", check=False)
+        box.run("ip", "address", "delete", "192.168.8.2/32", "dev", "lo", check=False)
+        box.path(CONFIGURATION).write_text("")
+        box.run("systemctl", "start", "gestured.service")
+
+
 def test_uninstall_leaves_settings_and_nothing_else(box: Container, installed: Path):
     box.run("systemctl", "disable", "--now", "gestured.service", *SOCKETS)
     root = installed.parent  # the container has taken usr out of the root

@@ -1,6 +1,7 @@
 """The units: how exposed they are, that systemd understands them, and where the two services differ."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,7 @@ UNITS = Path(__file__).resolve().parents[2] / "systemd"
 FILES = sorted([*UNITS.glob("*.service"), *UNITS.glob("*.socket")])
 NETWORK = {
     "Description", "Wants", "After", "Conflicts", "Sockets", "Also",
-    "PrivateNetwork", "RestrictAddressFamilies", "IPAddressAllow",
+    "PrivateNetwork", "RestrictAddressFamilies", "IPAddressAllow", "ExecStopPost",
 }  # fmt: skip
 
 analyze = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
@@ -76,6 +77,24 @@ def test_systemd_finds_nothing_wrong(tmp_path: Path):
 def test_the_services_differ_in_the_network_alone():
     activated, standalone = keys("gestured.service"), keys("gestured-standalone.service")
     assert {key for key in activated | standalone if activated.get(key) != standalone.get(key)} <= NETWORK
+
+
+@pytest.mark.parametrize("unit", ["gestured-standalone.service", "gestured@.service"])
+def test_an_address_that_comes_late_exhausts_no_starts(tmp_path: Path, unit: str):
+    """The daemon ends with status 4 until the address is there, in a fraction of a second."""
+    found = keys(unit)
+    program, option, script = shlex.split(found["ExecStopPost"][0].replace("$$", "$"))
+    (tmp_path / "sleep").write_text('#!/bin/sh\necho "$1"\n')
+    (tmp_path / "sleep").chmod(0o755)
+
+    def slept(status: str) -> float:
+        env = {"EXIT_STATUS": status, "PATH": f"{tmp_path}:/usr/bin:/bin"}
+        said = subprocess.run([program, option, script], env=env, check=True, capture_output=True, text=True).stdout
+        return float(said or 0)
+
+    assert slept("4") * int(found["StartLimitBurst"][0]) >= int(found["StartLimitIntervalSec"][0])
+    assert slept("4") < float(found["TimeoutStopSec"][0].removesuffix("s"))
+    assert [slept(status) for status in ("0", "1", "KILL")] == [0.0] * 3  # a crash is over at once
 
 
 def test_an_instance_differs_from_the_standalone_service_in_its_name_alone():
