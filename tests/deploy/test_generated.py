@@ -4,14 +4,16 @@ import argparse
 import re
 import shutil
 import subprocess
-import sys
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from deploy.generate import animation, completion, configuration, dashboard, man, programs
+from gestured.daemon.explain import explain
 from gestured.daemon.settings import FLAGS, TABLES, Settings
+from tests.daemon.parts import settings_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = man.pages()
@@ -42,20 +44,14 @@ def test_the_animation_in_the_readme_is_made_from_its_recording():
     assert len(picture.findall(".//{*}animate")) > 40 and not picture.findall(".//{*}script")
 
 
-def explain(path: Path) -> "subprocess.CompletedProcess[str]":
-    """What the daemon says of a configuration."""
-    command = [sys.executable, "-m", "gestured.daemon", "--config", str(path), "--explain"]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
-
-
 def test_the_example_sets_nothing_and_each_of_its_keys_is_valid(tmp_path: Path):
-    done = explain(ROOT / "deploy" / "gestured.toml")
-    assert done.returncode == 0 and "nothing, all defaults" in done.stdout, done.stderr
+    def told(path: Path) -> str:
+        return explain(*settings_of("--config", path))
+
+    assert "nothing, all defaults" in told(ROOT / "deploy" / "gestured.toml")
     everything = tmp_path / "all.toml"
     everything.write_text(re.sub(r"^#(?=[\w\[])", "", configuration.example(), flags=re.MULTILINE))
-    done = explain(everything)
-    assert done.returncode == 0, done.stderr
-    set_by = {line.split(":")[0].strip() for line in done.stdout.split("set by:")[1].splitlines() if line}
+    set_by = {line.split(":")[0].strip() for line in told(everything).split("set by:")[1].splitlines() if line}
     ours = {theirs: next((OURS[part] for part in OURS if theirs.startswith(part)), None) for theirs in set_by}
     keys = {name or key.partition(".")[0] for key, name in ours.items()}
     assert keys == set(Settings.model_fields) == {*FLAGS, *TABLES}
@@ -86,9 +82,15 @@ def test_man_pages_are_readable(tmp_path: Path, name: str):
             assert " ".join((part.epilog or "").split()) in shown
 
 
+@cache
+def bash(program: str) -> str:
+    """The script that completes a program."""
+    return completion.completion(programs.PARSERS[program](), "bash")
+
+
 def complete(program: str, *words: str) -> set[str]:
     """What bash offers after these words."""
-    script = completion.completion(programs.PARSERS[program](), "bash") + (
+    script = bash(program) + (
         f"\nCOMP_WORDS=({' '.join(repr(word) for word in (program, *words))}); COMP_CWORD={len(words)}\n"
         f'$(complete -p {program} | grep -o "_shtab[a-z_]*"); printf "%s\\n" "${{COMPREPLY[@]}}"\n'
     )

@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -32,38 +31,33 @@ def test_a_target_asks_pip_for_what_is_missing_and_for_nothing_else(tmp_path: Pa
     assert (tmp_path / "done.txt").read_text().splitlines() == [line.format(clone=tmp_path) for line in done]
 
 
-Install = Callable[[str, Path], "subprocess.CompletedProcess[str]"]
-
-
-@pytest.fixture
-def run(tmp_path: Path) -> Install:
-    """Runs deploy/install.sh or deploy/uninstall.sh, with a pip that installs nothing."""
+def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_stay(tmp_path: Path):
+    """With a pip that installs nothing."""
     pytest.importorskip("shtab")
-    programs = tmp_path / "venv" / "bin"
+    root, programs = tmp_path / "root", tmp_path / "venv" / "bin"
     programs.mkdir(parents=True)
-    (programs / "python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
-    (programs / "pip").write_text("#!/bin/sh\n")
-    for program in programs.iterdir():
-        program.chmod(0o755)
+    for name, text in (("python", f'exec {sys.executable} "$@"\n'), ("pip", "")):
+        (programs / name).write_text(f"#!/bin/sh\n{text}")
+        (programs / name).chmod(0o755)
 
-    def run(script: str, root: Path) -> "subprocess.CompletedProcess[str]":
-        venv = [programs.parent] if script == "install" else []
-        command = [ROOT / "deploy" / f"{script}.sh", *venv, root, "/usr"]
-        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    def run(script: str, *arguments: Path) -> None:
+        command = [ROOT / "deploy" / f"{script}.sh", *arguments, root, "/usr"]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
 
-    return run
-
-
-def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_stay(tmp_path: Path, run: Install):
-    root = tmp_path / "root"
-    assert (done := run("install", root)).returncode == 0, done.stderr
     old, mine = root / "usr/share/doc/gestured/old.md", root / "etc/gestured/gestured.toml"
-    old.write_text("a page that is no more")
-    mine.write_text("touch = true\n")
-    with (root / "usr/lib/gestured/installed").open("a") as installed:
-        installed.write("/usr/share/doc/gestured/old.md\n")
-    assert (done := run("install", root)).returncode == 0, done.stderr
-    assert not old.exists()
-    assert (done := run("uninstall", root)).returncode == 0, done.stderr
+    before = {
+        old: "a page that is no more",
+        mine: "touch = true\n",
+        root / "usr/lib/gestured/installed": "/usr/share/doc/gestured/old.md\n",
+        root / "usr/lib/gestured/old.py": "a module that is no more",
+    }
+    for path, text in before.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    run("install", programs.parent)
+    assert not old.exists() and not (root / "usr/lib/gestured/old.py").exists()
+    assert (root / "usr/share/doc/gestured/README.md").exists()
+    run("uninstall")
     assert [path for path in root.rglob("*") if path.is_file()] == [root / "etc/default/gestured", mine]
-    assert mine.read_text() == "touch = true\n"
+    assert mine.read_text() == before[mine]
