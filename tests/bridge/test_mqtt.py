@@ -8,7 +8,6 @@ import select
 import shutil
 import signal
 import socket
-import ssl
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -483,24 +482,15 @@ def tls(certificates: Path) -> list[str]:
     return ["allow_anonymous true", f"certfile {certificates}/broker.pem", f"keyfile {certificates}/broker.key"]
 
 
-def test_tls(bridge, broker, fake, certificates: Path):
+def test_a_broker_with_tls_is_called_as_it_wants_or_says_why_not(bridge, broker, fake, certificates: Path):
     at = broker(*tls(certificates), "user root")
-    assert ssl.create_default_context(cafile=certificates / "ca.pem")
     process = begin(bridge, at, fake, "--tls", "--ca", certificates / "ca.pem")
     fake.accept()
     process.ready()
-
-
-def test_a_certificate_of_somebody_else_is_refused(bridge, broker, fake, certificates: Path):
-    at = broker(*tls(certificates), "user root")
     process = begin(bridge, at, fake, "--tls", "--ca", certificates / "other.pem")
     assert process.end() == 1
     assert f"the certificate of the broker {at.address} is not to be trusted" in process.said()
     assert "--ca FILE" in process.said() and process.said().count("\n") <= 2
-
-
-def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, certificates: Path):
-    at = broker(*tls(certificates), "user root")
     process = begin(bridge, at, fake)
     assert f"{at.address} is not there: it closed the connection" in process.until("is it one with TLS: --tls?")
 

@@ -34,12 +34,28 @@ topic readwrite #
 """
 
 
-@pytest.fixture
-def gated(model: Path, tmp_path: Path) -> Iterator[Daemon]:
+@pytest.fixture(scope="module")
+def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon with a socket for bridges."""
-    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, "--gates", tmp_path / "gates.sock")
+    folder = tmp_path_factory.mktemp("gated")
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, "--gates", folder / "gates.sock")
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
+
+
+@pytest.fixture(scope="module")
+def arm(shared: Daemon) -> Sensor:
+    """Its sensor `armrest`."""
+    return Sensor(shared, "armrest")
+
+
+@pytest.fixture
+def gated(shared: Daemon) -> Iterator[Daemon]:
+    """The same daemon, whose gates are all open before each test."""
+    yield shared
+    with Control(Path(shared.ready["control"])) as operator:
+        for gate in {name for told in operator.ask("status")["sensors"].values() for name in told["closed"]}:
+            operator.ask("allow", gate=gate)
 
 
 @pytest.fixture
@@ -72,32 +88,32 @@ def start(bridge: Callable[..., Process], at: Broker, daemon: Daemon, *more: obj
     return process, ready
 
 
-def known(daemon: Daemon) -> tuple[Sensor, Client]:
-    """A sensor that the daemon knows, and who hears of it."""
+def known(daemon: Daemon, arm: Sensor) -> Client:
+    """Who hears of a sensor that the daemon knows."""
     client = daemon.client().subscribe("gesture", "unknown", "gate")
-    sensor = Sensor(daemon, "armrest").begin().perform("left")
+    arm.begin().perform("left")
     assert client.line()["gesture"] == "swipe_left"
-    return sensor, client
+    return client
 
 
-def test_what_the_bus_closes_stays_closed_when_the_bridge_is_killed(bridge, at, gated, house) -> None:
-    sensor, client = known(gated)
+def test_what_the_bus_closes_stays_closed_when_the_bridge_is_killed(bridge, at, gated, arm, house) -> None:
+    client = known(gated, arm)
     process, _ = start(bridge, at, gated)
     say(house, OFF)
     assert client.line()["closed"] == ["mqtt"]
     process.process.kill()
     process.process.wait()
-    sensor.perform("left", "up")
+    arm.perform("left", "up")
     assert [client.line()["gates"] for _ in range(2)] == [["mqtt"], ["mqtt"]]
     with Control(Path(gated.ready["control"])) as operator:
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["mqtt"]
         operator.ask("allow", gate="mqtt")
-    sensor.perform("down")
+    arm.perform("down")
     assert [client.line().get(key) for key in ("closed", "gesture")] == [[], "swipe_down"]  # nothing in between
 
 
-def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, house) -> None:
-    _, client = known(gated)
+def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, arm, house) -> None:
+    client = known(gated, arm)
     start(bridge, at, gated, "--gate", "house")
     for command, closed in ((OFF, ["house"]), (ON, [])):
         say(house, command)
@@ -105,8 +121,8 @@ def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, house) -> Non
         house.until(GATES, json.dumps({"armed": None, "closed": closed, "until": None}))
 
 
-def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, house) -> None:
-    _, client = known(gated)
+def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, arm, house) -> None:
+    client = known(gated, arm)
     say(house, OFF, retain=True)  # before the bridge comes
     _, ready = start(bridge, at, gated, "--metrics", "127.0.0.1:0")
     say(house, OFF, retain=True)
@@ -125,8 +141,8 @@ def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, house) ->
     assert client.line()["closed"] == ["door"]
 
 
-def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daemon, monkeypatch) -> None:
-    known(gated)
+def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daemon, arm: Sensor, monkeypatch) -> None:
+    known(gated, arm)
     gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
     monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 0.001)
     gate.obey("armrest", OFF)
@@ -140,8 +156,8 @@ def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daem
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
 
 
-def test_what_the_daemon_said_before_closes_no_gate_that_the_bus_has_opened(gated: Daemon) -> None:
-    known(gated)
+def test_what_the_daemon_said_before_closes_no_gate_that_the_bus_has_opened(gated: Daemon, arm: Sensor) -> None:
+    known(gated, arm)
     gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
     gate.obey("armrest", OFF)
     told = time.time()
@@ -250,9 +266,9 @@ def test_a_broker_that_lets_nobody_hear_commands_is_none_for_gates(bridge, broke
     assert "does not let us hear commands" in said and "allow this user to read gestured/car/+/gate/set" in said
 
 
-def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, house, tmp_path: Path) -> None:
+def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, arm, house) -> None:
     process, _ = start(bridge, at, gated)
-    _, client = known(gated)
+    client = known(gated, arm)
     path = Path(gated.ready["gates"])
     path.rename(path.with_suffix(".away"))
     wait(lambda: (say(house, OFF), "armrest OFF: " in process.said())[1])

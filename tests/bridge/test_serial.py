@@ -28,7 +28,7 @@ from gestured.core.address import Address
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import Process, page, wait
 from tests.bridge.test_protocols import written
-from tests.daemon.harness import DEADLINE_S, Hand, Sensor, blob, floats
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
 from tests.sockets import free_address
 
 pytest.importorskip("serial", reason="the bridge from serial lines needs the extra [serial]")
@@ -86,11 +86,18 @@ def line(tmp_path: Path) -> Iterator[Line]:
     os.close(line.end)
 
 
-def begin(bridge: Callable[..., Process], line: Line, protocol: str, udp: socket.socket, *more: object) -> Process:
+def begin(
+    bridge: Callable[..., Process],
+    line: Line,
+    protocol: str,
+    udp: socket.socket,
+    *more: object,
+    sensor: str = "armrest",
+) -> Process:
     """A bridge on the line that sends to a socket, open."""
     to = f"127.0.0.1:{udp.getsockname()[1]}"
     grid = () if "--grid" in more else ("--grid", GRID[protocol])
-    process = bridge("serial", line.link, "--protocol", protocol, "--sensor", "armrest", "--to", to, *grid, *more)
+    process = bridge("serial", line.link, "--protocol", protocol, "--sensor", sensor, "--to", to, *grid, *more)
     assert process.ready()["device"] == str(line.link)
     return process
 
@@ -108,15 +115,28 @@ class Out:
         return arrival
 
 
+@pytest.fixture(scope="module")
+def knows_grids(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon that knows the sensors of the test below, which are named by their protocols."""
+    folder = tmp_path_factory.mktemp("grids")
+    grids = {name: grid for protocol, grid in GRID.items() for name in (protocol, f"direct-{protocol}")}
+    settings = "".join(f'[sensors.{name}]\ngrid = "{grid}"\n' for name, grid in grids.items())
+    (folder / "gestured.toml").write_text(settings)
+    flags = ("--clock", "sensor", "--stale-s", 30, "--config", folder / "gestured.toml")
+    daemon = Daemon.start(folder, model, *flags)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+
+
 @pytest.mark.parametrize("protocol", sorted(GRID))
-def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, serve, protocol):
+def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, knows_grids, protocol):
     """Each frame goes to one sensor by UDP and to another one through the line, with the same time."""
-    daemon = serve("--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol])
-    process = begin(bridge, line, protocol, udp)
+    daemon = knows_grids
+    process = begin(bridge, line, protocol, udp, sensor=protocol)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
     hand = Hand()
-    direct = Sensor(daemon, "direct", floats if protocol in ("csv", "osc-slip") else blob("u1"))
-    around = Sensor(daemon, "armrest").sock
+    direct = Sensor(daemon, f"direct-{protocol}", floats if protocol in ("csv", "osc-slip") else blob("u1"))
+    around = Sensor(daemon, protocol).sock
     performed = [*hand.idle(2.0)]
     for motion in (hand.swipe("left"), hand.tap(), hand.swipe("up"), hand.swipe("down")):
         performed += [*motion, *hand.idle(1.0)]
@@ -131,14 +151,14 @@ def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, li
         line.say(written(protocol, frame))
         packet = udp.recv(65536)
         around.send(packet[:8] + sent[8:16] + packet[16:])  # at the same time
-    events = {"direct": [], "armrest": []}
+    events = {direct.name: [], protocol: []}
     while min(map(len, events.values())) < 4:
         event = client.line()
         events[event["sensor"]].append(
             {key: event.get(key) for key in ("type", "gesture", "id", "confidence", "scores", "frames", "lost")}
         )
-    assert events["direct"] == events["armrest"]
-    assert [event["gesture"] for event in events["direct"]] == ["swipe_left", "one_tap", "swipe_up", "swipe_down"]
+    assert events[direct.name] == events[protocol]
+    assert [event["gesture"] for event in events[protocol]] == ["swipe_left", "one_tap", "swipe_up", "swipe_down"]
     assert process.stop() == 0
 
 
@@ -148,11 +168,15 @@ def frame(value: int, shape: tuple[int, int] = (9, 9)) -> np.ndarray:
 
 def test_a_sensor_without_a_counter_gets_one_and_one_with_a_counter_keeps_it(bridge, line, udp):
     out = Out(udp)
-    process = begin(bridge, line, "flexitac", udp)
+    where = str(free_address(socket.SOCK_STREAM))
+    process = begin(bridge, line, "flexitac", udp, "--metrics", where)
+    line.say(b"rubbish")
     for n in range(1, 5):
         line.say(written("flexitac", frame(n)))
         arrival = out.next()
         assert (arrival.values == n).all() and arrival.counter == n
+    wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 4.0' in page(where))
+    assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page(where)
     process.stop()
     begin(bridge, line, "csv", udp)
     line.say(b"\n" + ",".join(["900", *["1.5"] * 81]).encode() + b"\n")
@@ -287,18 +311,6 @@ def test_a_device_of_another_program_and_one_that_is_not_ours(bridge, line, udp)
         assert process.end() == 1
         assert "another program has it open" in process.said()
     assert stat.S_ISCHR(os.stat(line.link).st_mode)
-
-
-def test_metrics(bridge, line, udp):
-    out = Out(udp)
-    to = f"127.0.0.1:{udp.getsockname()[1]}"
-    flags = ("--protocol", "flexitac", "--sensor", "armrest", "--grid", "9x9", "--to", to, "--metrics", "127.0.0.1:0")
-    address = bridge("serial", line.link, *flags)
-    where = address.ready()["metrics"]
-    line.say(b"rubbish" + written("flexitac", frame(1)) + written("flexitac", frame(2)))
-    out.next()
-    wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 2.0' in page(where))
-    assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page(where)
 
 
 def test_a_log_on_a_full_disk_ends_no_bridge(line: Line, udp: socket.socket) -> None:

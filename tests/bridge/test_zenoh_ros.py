@@ -169,22 +169,6 @@ def test_an_attachment_counts_dates_and_names_its_publisher(bridge, site, fake):
     assert len({name for _, _, name in parts}) == 1 and len(parts[0][2]) == 16
 
 
-def test_a_router_that_comes_back_finds_node_and_topics_again(bridge, site, fake):
-    process = begin(bridge, site, fake)
-    fake.accept()
-    process.ready()
-    fake.say(STATUS)
-    site.router.close()
-    wait(lambda: fake.say(STATUS) or "no router and no peer" in process.said(), process.said)
-    site.router = opened("router", listen=site.endpoint)
-    wait(lambda: fake.say(STATUS) or process.said().count("Zenoh is there") == 2, process.said)
-    listener = Listener(site, "/gestured/armrest/gesture")
-    wait(lambda: fake.say(gesture(5)) or not listener.samples.empty())
-    found = [str(reply.ok.key_expr) for reply in site.client.liveliness().get("@ros2_lv/**") if reply.ok]
-    ours = [key for key in found if "/gestured" in key and "/listener/" not in key]
-    assert len(ours) == 3, found  # the node, its status, the gestures of one sensor
-
-
 @pytest.mark.parametrize("text", ["abc", "-1", "233", "1000000", "²"])
 def test_a_domain_that_ros_does_not_have_is_refused(text: str, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)

@@ -169,16 +169,17 @@ values = st.recursive(
     leaves, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3), max_leaves=8
 )
 spaces = st.sampled_from([(",", ":"), (", ", ": "), (" ,  ", "\t:\r")])
+styles = st.fixed_dictionaries({"ensure_ascii": st.booleans(), "separators": spaces})
 numbers = st.floats(-1e18, 1e18) | st.integers(-(2**53), 2**53)
 
 
 @settings(max_examples=40)
-@given(st.dictionaries(words, values, max_size=4), words, numbers, st.booleans(), spaces)
+@given(st.dictionaries(words, values, max_size=4), words, numbers, styles)
 def test_a_text_and_a_number_are_what_json_says(
-    parser, around: dict[str, Any], text: str, number: float, ascii_: bool, separators: Any
+    parser, around: dict[str, Any], text: str, number: float, style: dict[str, Any]
 ):
     def line(**keys: object) -> bytes:
-        return json.dumps(around | keys, ensure_ascii=ascii_, separators=separators).encode()
+        return json.dumps(around | keys, **style).encode()
 
     around.pop("key", None)
     out, value = ctypes.create_string_buffer(200), ctypes.c_double()
