@@ -3,6 +3,7 @@
 import ast
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,12 @@ ONLY_IN = {
 }
 
 
+@cache
+def parsed(text: str) -> ast.Module:
+    """A module's tree."""
+    return ast.parse(text)
+
+
 def imports(path: Path) -> Iterator[tuple[str, bool]]:
     """(full name of each imported module, whether only inside a function)."""
     package = path.relative_to(ROOT).with_suffix("").parts[:-1]
@@ -55,7 +62,7 @@ def imports(path: Path) -> Iterator[tuple[str, bool]]:
         for child in ast.iter_child_nodes(node):
             yield from walk(child, inside)
 
-    yield from walk(ast.parse(path.read_text()), False)
+    yield from walk(parsed(path.read_text()), False)
 
 
 def faults(path: Path) -> list[str]:
@@ -99,7 +106,7 @@ def known() -> dict[str, set[str]]:
     found = {}
     for path, name in names.items():
         imported = {module for one, _ in imports(path) for module in (one, one.rpartition(".")[0])}
-        texts = {node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)}
+        texts = {node.value for node in ast.walk(parsed(path.read_text())) if isinstance(node, ast.Constant)}
         found[name] = {module for module in modules - {name} if module in imported or module in texts}
     return found
 

@@ -68,7 +68,7 @@ DRIVE = drive()
 OPEN = [fact for fact in played(DRIVE, SCENE) if isinstance(fact, Gesture)]
 
 
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.floats(1.0, 9.0), st.floats(0.0, 5.0))
 def test_what_a_closed_gate_touches_is_unknown_and_all_else_is_as_ever(closed: float, seconds: float) -> None:
     opened = closed + seconds
