@@ -1,4 +1,4 @@
-"""A sensor's name as a part of a ROS name, and back.
+"""A sensor's name as a part of a ROS name.
 
 The daemon takes letters, digits, `_` and `-`. ROS takes no `-` and no digit in front, hides what begins with `_`, and
 discourages `__`. A name without any of these stays as it is, unless it begins with `x`. Any other gets an `x` in front,
@@ -9,7 +9,6 @@ import re
 
 PLAIN = re.compile(r"[A-Za-wyz](_?[A-Za-z0-9])*_?")
 WRITTEN = {"_": "_5f", "-": "_2d"}
-READ = {written: sign for sign, written in WRITTEN.items()}
 
 
 def token(sensor: str) -> str:
@@ -17,11 +16,3 @@ def token(sensor: str) -> str:
     if PLAIN.fullmatch(sensor):
         return sensor
     return "x" + "".join(WRITTEN.get(sign, sign) for sign in sensor)
-
-
-def sensor_of(part: str) -> str:
-    """The sensor for which `token` gives this part of a name. Raises ValueError where there is none."""
-    sensor = part if PLAIN.fullmatch(part) else re.sub("_..", lambda found: READ.get(found[0], "?"), part[1:])
-    if not re.fullmatch("[A-Za-z0-9_-]+", sensor) or token(sensor) != part:
-        raise ValueError(f"{part!r} stands for no sensor")
-    return sensor
