@@ -22,7 +22,7 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 
-COUNT = 60  # enough that LEAST lets one label differ
+COUNT = 50  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides
 # Whether a gesture near the threshold is said or unknown is decided by the verifier, which has not learned from windows
 # that are turned, and sees how far a contact stands out from the noise, which frames that come twice halve.

