@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # Settings, refusals, default sockets, commands and sentences: what an environment has changed before.
 FEW = (
-    "tests/daemon/test_parts.py",
+    "tests/daemon/test_parts.py::test_flags_win_over_the_environment_that_over_the_file_that_over_defaults",
+    "tests/daemon/test_parts.py::test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else",
     "tests/daemon/test_start.py::test_the_default_socket_is_the_sessions",
     "tests/daemon/test_start.py::test_settings_that_are_not_valid",
     "tests/daemon/test_start.py::test_explain_says_what_is_loaded_and_what_is_left_out",

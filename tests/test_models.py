@@ -30,7 +30,7 @@ from gestured.model.model import Model
 from gestured.model.opening import check, open_model
 from gestured.model.prototypes import Space
 from gestured.model.session import Session
-from gestured.model.shipped import LADDER, shipped
+from gestured.model.shipped import LADDER
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
 from tests.opening import NO_FILES, no_file
@@ -92,7 +92,9 @@ def test_values_that_are_not_finite_are_unknown(tmp_path: Path, takes: str, leve
 def test_a_segment_is_answered_whatever_went_on_before_it(name: str, rest: float) -> None:
     """What has rested may by now weigh less than nothing: a sensor that cools sinks below what it showed when bare."""
     before = Before(quiet_s=0.0, recent=400, length_s=1e6, covered=1.0, rest=rest)
-    scores = open_model(name).classify(replace(segment(), before=before))
+    model = open_model(name)
+    scores = model.classify(replace(segment(), before=before))
+    assert (model.gestures, model.rows, model.columns) == (tiny_model.GESTURES, 9, 9)
     assert np.isfinite(scores.values).all() and 0.0 <= scores.unknown <= 1.0
 
 
@@ -547,16 +549,6 @@ def test_shipped_file_without_its_manifest_is_refused(shelf: Path, manifest: str
         (shelf / "manifest.json").write_text(manifest)
     with pytest.raises(ModelError, match=r"manifest\.json"):
         open_model("lstm")
-
-
-@pytest.mark.parametrize("name", LADDER)
-def test_models_that_ship(name: str) -> None:
-    if not shipped()[name].exists():
-        pytest.skip(f"models/{name}.onnx has not been trained yet")
-    model = open_model(name)
-    assert model.gestures == tiny_model.GESTURES
-    assert (model.rows, model.columns) == (9, 9)
-    assert np.isfinite(model.classify(segment()).values).all()
 
 
 def test_the_bench_asks_a_model_for_what_the_daemon_asks(monkeypatch: pytest.MonkeyPatch) -> None:

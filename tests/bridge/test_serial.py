@@ -216,7 +216,7 @@ def test_an_unplugged_sensor_is_waited_for(bridge, line, udp):
     assert (arrival.values == 2).all() and arrival.counter == 2
 
 
-def test_a_sensor_that_is_plugged_in_later_is_waited_for(bridge, udp, tmp_path):
+def test_a_sensor_that_is_plugged_in_later_is_waited_for(bridge, tmp_path):
     link = tmp_path / "ttyUSB0"
     process = bridge("serial", link, "--protocol", "csv", "--sensor", "armrest", "--to", "127.0.0.1:1")
     process.until(f"{link} is not there: No such file or directory; waiting for it")
@@ -303,7 +303,7 @@ def test_bad_input_is_one_sentence(refused, tmp_path: Path, device: str, more: l
     assert words in refused("serial", path, "--protocol", "csv", "--sensor", "armrest", *more)
 
 
-def test_a_device_of_another_program_and_one_that_is_not_ours(bridge, line, udp):
+def test_a_device_of_another_program_and_one_that_is_not_ours(bridge, line):
     import serial
 
     with serial.Serial(str(line.link), exclusive=True):

@@ -301,7 +301,7 @@ def test_the_model_looks_at_most_fifteen_times_a_second(rate: float) -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_jitter_skips_no_frame_at_the_nominal_rate(seed: int) -> None:
     seer = Seer(early=lambda segment: says("left", 0.5))
-    stream = frames("sensor rate 15 jitter 8ms", "quiet for 4s", "move 4,1 to 4,7 0.8 in 3s", PAUSE)
+    stream = frames("sensor rate 15 jitter 8ms", "quiet for 4s", "move 4,1 to 4,7 0.8 in 3s", PAUSE, seed=seed)
     run(recognizer(seer), stream)
     times = [frame.t for frame in stream]
     looked = [segment.offset for segment in touching(seer)]
