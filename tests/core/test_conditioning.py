@@ -441,20 +441,6 @@ def test_a_swipe_beside_what_lies_there_faintly_is_a_segment_of_its_own(faint: f
     follow_rules(events)
 
 
-@pytest.mark.parametrize("seconds", [2.0, 3.0, 4.0])
-def test_what_is_hardly_wider_than_fingers_is_learned_like_an_arm(seconds: float) -> None:
-    """An elbow: seven taxels that it presses and four at half of that, which noise lifts above and below the half."""
-    elbow = np.zeros(SHAPE)
-    elbow[3:6, 0:2] = elbow[4, 2] = GAIN / 4
-    elbow[[3, 5, 2, 6], [2, 2, 0, 0]] = 0.51 * GAIN / 4
-    lies: Action = (seconds, lambda share: elbow)
-    swiped: Action = (0.4, lambda share: finger(7 - 6 * share, 7, SHAPE) + elbow)
-    _, events = heard(*stream(SHAPE, [quiet(2), lies, swiped, (1.0, lies[1])]))
-    assert kinds(events) == [Opened, Void, Ended, *ONE]
-    (found,) = segments(events)
-    assert abs(found.onset - 2.0 - seconds) < 0.15 and abs(found.offset - 2.4 - seconds) < 0.15
-
-
 @pytest.mark.parametrize("trembles", [0.02, 0.05, 0.1, 0.2])
 def test_something_narrow_that_trembles_is_learned_in_ten_seconds(trembles: float) -> None:
     """The corner of a bag in a vehicle: it never lies still for a second, and must not keep the sensor deaf."""
