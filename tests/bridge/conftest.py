@@ -39,7 +39,8 @@ class Process:
         readable, _, _ = select.select([self.process.stdout], [], [], DEADLINE_S)
         line = self.process.stdout.readline() if readable else ""
         assert line, self.said()
-        return json.loads(line)
+        self.told: dict[str, Any] = json.loads(line)
+        return self.told
 
     def said(self) -> str:
         """What it has said so far."""

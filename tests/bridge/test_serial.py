@@ -168,8 +168,8 @@ def frame(value: int, shape: tuple[int, int] = (9, 9)) -> np.ndarray:
 
 def test_a_sensor_without_a_counter_gets_one_and_one_with_a_counter_keeps_it(bridge, line, udp):
     out = Out(udp)
-    where = str(free_address(socket.SOCK_STREAM))
-    process = begin(bridge, line, "flexitac", udp, "--metrics", where)
+    process = begin(bridge, line, "flexitac", udp, "--metrics", "127.0.0.1:0")
+    where = process.told["metrics"]
     line.say(b"rubbish")
     for n in range(1, 5):
         line.say(written("flexitac", frame(n)))
