@@ -111,12 +111,17 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     return refuse
 
 
+def served(folder: Path, model: Path, *flags: object) -> Iterator[Daemon]:
+    """For a fixture: a real daemon with the sensor's clock."""
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, *flags)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+
+
 @pytest.fixture(scope="module")
 def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A real daemon with the sensor's clock."""
-    daemon = Daemon.start(tmp_path_factory.mktemp("daemon"), model, "--clock", "sensor", "--stale-s", 30)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
+    yield from served(tmp_path_factory.mktemp("daemon"), model)
 
 
 def emit(daemon: Daemon, gesture: str, sensor: str = "armrest") -> None:

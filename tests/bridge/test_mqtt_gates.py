@@ -19,7 +19,7 @@ from gestured.bridge.gates import OFF, ON, Gate
 from gestured.bridge.mqtt_session import Mqtt
 from gestured.client.control import Control
 from gestured.client.lines import Refused
-from tests.bridge.conftest import Broker, Process, guarded, page, wait
+from tests.bridge.conftest import Broker, Process, guarded, page, served, wait
 from tests.bridge.test_mqtt import Listener
 from tests.daemon.harness import Client, Daemon, Sensor
 
@@ -38,9 +38,7 @@ topic readwrite #
 def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon with a socket for bridges."""
     folder = tmp_path_factory.mktemp("gated")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, "--gates", folder / "gates.sock")
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
+    yield from served(folder, model, "--gates", folder / "gates.sock")
 
 
 @pytest.fixture(scope="module")

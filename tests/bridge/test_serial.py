@@ -26,7 +26,7 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.serial import AGAIN_S, Serial
 from gestured.core.address import Address
 from gestured.core.wire import Addresses, Decoder
-from tests.bridge.conftest import Process, page, wait
+from tests.bridge.conftest import Process, page, served, wait
 from tests.bridge.test_protocols import written
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
 from tests.sockets import free_address
@@ -122,10 +122,7 @@ def knows_grids(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     grids = {name: grid for protocol, grid in GRID.items() for name in (protocol, f"direct-{protocol}")}
     settings = "".join(f'[sensors.{name}]\ngrid = "{grid}"\n' for name, grid in grids.items())
     (folder / "gestured.toml").write_text(settings)
-    flags = ("--clock", "sensor", "--stale-s", 30, "--config", folder / "gestured.toml")
-    daemon = Daemon.start(folder, model, *flags)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
+    yield from served(folder, model, "--config", folder / "gestured.toml")
 
 
 @pytest.mark.parametrize("protocol", sorted(GRID))
