@@ -127,7 +127,7 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
     return said, known
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_packets_say_the_same_one_by_one_or_all_at_once_or_where_a_pass_has_a_bug(
     seed: int, passed: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,9 +148,9 @@ def test_packets_say_the_same_one_by_one_or_all_at_once_or_where_a_pass_has_a_bu
 def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
     """So slowly that no frame of it is a touch: only the review of the noise can find it."""
     rng, arrived = np.random.default_rng(0), list[Read]()
-    for k in range(1500):
+    for k in range(1000):
         loud = np.ones((EACH, 81))
-        loud[:3, 40] = np.exp(k / 375)
+        loud[:3, 40] = np.exp(k / 250)
         values = np.rint(100 + 20 * loud * rng.normal(0, 1, loud.shape))
         arrived.append((k / 15, list(zip(PLAIN, packed(PLAIN, values), strict=True))))
     said, known = play(arrived, together=True)
