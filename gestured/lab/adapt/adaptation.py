@@ -49,15 +49,6 @@ class Answers:
             np.concatenate([samples.people, missed]),
         )
 
-    def where(self, chosen: NDArray[np.bool_], other: "Answers") -> "Answers":
-        """The same rows, the chosen ones answered by the other."""
-        return Answers(
-            self.known,
-            np.where(chosen, other.right, self.right),
-            np.where(chosen, other.confidence, self.confidence),
-            self.unit,
-        )
-
     def shares(self, least: float) -> "Shares":
         """What they are worth, published from a confidence of `least` on."""
         published = self.confidence >= least
@@ -165,31 +156,30 @@ def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
 def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Course) -> Settled:
     """Go on from networks that publish from `least` on, with own recordings."""
     groups = held_out(own)
-    run = _Run(start, own, groups.of_samples, takes)
     ends = [
         learned(start, takes.teach, own.samples.take(groups.of_samples != k), course, f"without {k + 1}/{groups.count}")
         for k in range(groups.count)
     ]
-    run.listen(ends)
+    run = _Run(start, own, groups.of_samples, takes, ends)
     samples = replace(own.samples, people=groups.unit_of_samples)
 
-    def answers(decision: Decision, said: Evidence) -> Answers:
-        return Answers.of(samples, said.answers(decision, start.verifier), groups.unit_of_missed)
+    def judged_by(said: decide.Answers) -> Answers:
+        return Answers.of(samples, said, groups.unit_of_missed)
 
-    of_rows = np.concatenate([groups.of_samples, groups.of_missed])
-    before = answers(start.decision, opinions(start, own.samples)).shares(least)
-    new: Answers | None = None
+    before = judged_by(opinions(start, own.samples).answers(start.decision, start.verifier)).shares(least)
+    scores, unknown = np.zeros((len(samples), len(GESTURES)), np.float32), np.zeros(len(samples), np.float32)
     for k in range(groups.count):
-        decision, way = run.decision(ends[k], groups.of_samples != k)
-        found = answers(decision, run.said[way])
-        new = found if new is None else new.where(of_rows == k, found)
-    assert new is not None
+        held = groups.of_samples == k
+        decision, way = run.decision(ends[k], ~held)
+        found = run.said[way].answers(decision, start.verifier)
+        scores[held], unknown[held] = (of[held] for of in found)
+    new = judged_by((scores, unknown))
 
     end = learned(start, takes.teach, own.samples, course, "all")
     decision, way = run.decision(end, np.ones(len(own.samples), bool))
     judged = between(start, end, way)
     judged.decision = decision
-    chosen = _least(answers(decision, run.said[way]), before)
+    chosen = _least(judged_by(run.said[way].answers(decision, start.verifier)), before)
     apart = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
     return Settled(judged, chosen, before, new.shares(_least(new, before)), way, groups, new, apart)
 
@@ -197,23 +187,22 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
 class _Run:
     """What the networks without each group say of it, at each way, and the decisions that follow."""
 
-    def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated) -> None:
-        self._start, self._own, self._groups, self._takes = start, own, groups, takes
+    def __init__(
+        self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated, ends: Sequence[Judged]
+    ) -> None:
+        self._start, self._takes = start, takes
         self._classes = classes_of(own.samples)
         self.said: dict[float, Evidence] = {}
         self._loss: dict[float, NDArray[np.float64]] = {}
-
-    def listen(self, ends: list[Judged]) -> None:
-        """Ask the networks without each group about it."""
-        parts = [np.flatnonzero(self._groups == k) for k in range(len(ends))]
+        parts = [np.flatnonzero(groups == k) for k in range(len(ends))]
         back = torch.from_numpy(np.argsort(np.concatenate(parts)))
         for way in WAYS:
             found = [
-                opinions(between(self._start, end, way), self._own.samples.take(part))
+                opinions(between(start, end, way), own.samples.take(part))
                 for end, part in zip(ends, parts, strict=True)
             ]
             self.said[way] = Evidence.join(found).take(back)
-            self._loss[way] = _losses(self._start, self.said[way], self._classes)
+            self._loss[way] = _losses(start, self.said[way], self._classes)
 
     def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
         """Fitted for networks that go to `end`, on those of `others` who were held out; and the way that suits them."""

@@ -46,7 +46,6 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
     """Read and cut. RecordingError or GesturedError in one sentence where nothing can be learned from them."""
     names: dict[str, int] = {}
     parts: list[Samples] = []
-    sittings: list[NDArray[np.int64]] = []
     missed: list[tuple[int, int]] = []
     left: Counter[str] = Counter()
     grid: tuple[int, ...] | None = None
@@ -65,14 +64,12 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
             )
         found = _named(replace(found, subjects=people), path, as_none, left)
         for part in _sittings(found):
-            place = len(parts)
             samples = _cut(part, path)
+            missed += [(person, len(parts)) for person in _missed(part, samples)]
             parts.append(samples)
-            sittings.append(np.full(len(samples), place, np.int64))
-            missed += [(person, place) for person in _missed(part, samples)]
     own = Own(
         join([collect([]), *parts]),
-        np.concatenate([np.zeros(0, np.int64), *sittings]),
+        np.repeat(np.arange(len(parts)), np.array([len(part) for part in parts], np.int64)),
         tuple(names),
         np.array(missed, np.int64).reshape(-1, 2),
         dict(left),
@@ -93,11 +90,10 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
 
 @dataclass(frozen=True)
 class Groups:
-    """Who is held out together: of each sample and of each missed gesture."""
+    """Who is held out together."""
 
     unit: str  # of what a group is made
     of_samples: NDArray[np.int64]  # (G,) 0 .. count - 1
-    of_missed: NDArray[np.int64]  # (M,)
     unit_of_samples: NDArray[np.int64]  # (G,) over which intervals are drawn
     unit_of_missed: NDArray[np.int64]  # (M,)
 
@@ -114,14 +110,11 @@ def held_out(own: Own) -> Groups:
         different, counts = np.unique(units, return_counts=True)
         if len(different) >= 2:
             group_of = _dealt(different, counts)
-            of_samples, of_missed = (
-                np.array([group_of.get(unit, 0) for unit in of.tolist()], np.int64) for of in (units, lost)
-            )
-            return Groups(name, of_samples, of_missed, units, lost)
+            of_samples = np.array([group_of[unit] for unit in units.tolist()], np.int64)
+            return Groups(name, of_samples, units, lost)
     count = min(GROUPS, len(own.samples))
     stretch = np.arange(len(own.samples)) * count // len(own.samples)
-    lost = np.arange(len(own.missed)) % count
-    return Groups("parts of one session", stretch, lost, stretch, lost)
+    return Groups("parts of one session", stretch, stretch, np.arange(len(own.missed)) % count)
 
 
 def _dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int]:
