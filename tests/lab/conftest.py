@@ -1,7 +1,6 @@
 """What the lab's tests share. Without the packages of the extra [lab], most of them are left out."""
 
 import sys
-from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -26,14 +25,8 @@ def lab() -> None:
         pytest.skip(f"needs of the extra [lab]: {', '.join(MISSING)}")
 
 
-@pytest.fixture(autouse=True, scope="session")
-def one_thread() -> Iterator[None]:
-    """Nets this small are slower on several threads, above all where something else computes."""
-    torch = sys.modules.get("torch")  # only where a test has it: to import it takes seconds
-    if torch is None:
-        yield
-        return
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    """Nets this small are many times as slow on several threads, where something else computes; --jobs sets more."""
+    if torch := sys.modules.get("torch"):  # only where a test has it: to import it takes seconds
+        torch.set_num_threads(1)
