@@ -51,12 +51,10 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
 def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     """Print the figures, and keep them in the manifest, the cards and a document."""
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
-    before: dict[str, dict[str, Any]] = {}
-    for name, path in paths.items():
-        open_model(path)  # says what is wrong before anything is simulated
-        before[name] = measured(path)
+    models = {name: open_model(path) for name, path in paths.items()}  # what is wrong is said before anything is done
+    before = {name: measured(path) for name, path in paths.items()}
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
-    found = simulated_figures(paths, data)
+    found = simulated_figures(models, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of

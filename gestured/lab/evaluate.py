@@ -34,7 +34,6 @@ from gestured.lab.train import (
 )
 from gestured.lab.verifier import Evidence
 from gestured.model.model import Model
-from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
 
 FEWEST = 20  # samples of a gesture, a person or a kind of which a share says something
@@ -122,11 +121,10 @@ def model_answers(model: Model, samples: Samples) -> Answers:
     return scores, unknown
 
 
-def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[str, dict[str, Any]]:
+def simulated_figures(models: Mapping[str, Model], data: TrainingData) -> dict[str, dict[str, Any]]:
     """Of each model and test set; with the share of each kind that was answered rightly."""
     found: dict[str, dict[str, Any]] = {}
-    for name, path in models.items():
-        model = open_model(path)
+    for name, model in models.items():
         found[name] = {}
         for test, samples in data.tests.items():
             given = model_answers(model, samples)
