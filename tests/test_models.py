@@ -341,6 +341,14 @@ def test_a_file_is_tried_with_few_variables_and_no_descriptors(tmp_path: Path, m
     assert message.endswith(" / [0, 1, 2]")
 
 
+def test_onnxruntimes_telemetry_is_switched_off_before_it_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ORT_DISABLE_TELEMETRY", raising=False)
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(ImportError):
+        Session(b"")
+    assert os.environ["ORT_DISABLE_TELEMETRY"] == "1"
+
+
 def test_a_folder_of_the_same_name_is_not_taken_for_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

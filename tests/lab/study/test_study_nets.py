@@ -1,9 +1,5 @@
 """The study's networks: causal, the same as a graph, the same for the same seed."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import torch
@@ -40,16 +36,6 @@ def test_the_graph_answers_as_the_network_for_every_length(kind: str) -> None:
             expected = net(x, torch.tensor([frames - 1])).softmax(1).numpy()
             assert np.allclose(graph.run(x.numpy()), expected, atol=1e-4)
         assert np.allclose(Graph.of_net(images).run(image.numpy()), images(image).numpy(), atol=1e-4)
-
-
-def test_a_graph_is_timed_in_a_process_without_onnxruntimes_telemetry() -> None:
-    code = (
-        "import os, sys\nfrom gestured.lab.study.run_time import Graph\n"
-        "from gestured.lab.study.training import HistoryNet\n"
-        "Graph.of_net(HistoryNet(10, 4))\nsys.exit(os.environ.get('ORT_DISABLE_TELEMETRY') != '1')"
-    )
-    environment = {name: value for name, value in os.environ.items() if name != "ORT_DISABLE_TELEMETRY"}
-    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
 
 
 def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None:
