@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,11 +63,12 @@ def sensor(port: int) -> Iterator[None]:
 def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int) -> None:
     trials = order("07", 0, ["one_tap"], 1)
     path = tmp_path / "07.npz"
-    with collect(tmp_path, port) as person:
-        person.sees("Do you agree?")
-        person.types("yes\n")
-        person.sees("Waiting for the sensor")
-        with sensor(port):
+    with ExitStack() as held:
+        with collect(tmp_path, port) as person:
+            person.sees("Do you agree?")
+            person.types("yes\n")
+            person.sees("Waiting for the sensor")
+            held.enter_context(sensor(port))
             person.sees("Enter when it is in place")
             person.types("\n")
             person.sees(f"1/9  {trials[0]}")
@@ -77,12 +78,9 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int) -> None:
             person.types("q")
             person.sees("the same command goes on from here")
             assert person.ends() == 0
-
-    with collect(tmp_path, port) as person:
-        person.sees("gave consent on")
-        person.sees("1 of 9 are done already")
-        person.sees("Waiting for the sensor")
-        with sensor(port):
+        with collect(tmp_path, port) as person:
+            person.sees("gave consent on")
+            person.sees("1 of 9 are done already")
             person.sees("Enter when it is in place")
             person.types("\n")
             person.sees(f"2/9  {trials[1]}")
