@@ -56,26 +56,21 @@ class Facts:
 
     def metadata(self) -> dict[str, str]:
         """As it stands in the file."""
-        people = {} if self.learned_from is None else {origin.KEY: json.dumps([dict(one) for one in self.learned_from])}
-        told = ("classes", "context", "operating_points", "provisional")
+        told = (origin.KEY, "classes", "context", "operating_points", "provisional")
         more: dict[str, Any] = {name: getattr(self, name) for name in told}
         known = {key: json.dumps(value, allow_nan=False) for key, value in more.items() if value is not None}
-        return (
-            people
-            | known
-            | {
-                "gestures": json.dumps(list(self.gestures)),
-                "kind": self.kind,
-                "version": self.version,
-                "rows": str(self.window.rows),
-                "columns": str(self.window.columns),
-                "rate_hz": repr(self.window.rate_hz),
-                "window": self.window.to_json(),
-                "calibration": json.dumps(dict(self.calibration), allow_nan=False),
-                "training_data": self.training_data,
-                "quantiles": json.dumps(dict(self.quantiles), allow_nan=False),
-            }
-        )
+        return known | {
+            "gestures": json.dumps(list(self.gestures)),
+            "kind": self.kind,
+            "version": self.version,
+            "rows": str(self.window.rows),
+            "columns": str(self.window.columns),
+            "rate_hz": repr(self.window.rate_hz),
+            "window": self.window.to_json(),
+            "calibration": json.dumps(dict(self.calibration), allow_nan=False),
+            "training_data": self.training_data,
+            "quantiles": json.dumps(dict(self.quantiles), allow_nan=False),
+        }
 
 
 def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
