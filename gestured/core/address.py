@@ -1,9 +1,9 @@
-"""How addresses, grids and sensors are written and read: HOST:PORT, ROWSxCOLUMNS, a name. It needs no numpy."""
+"""Addresses, grids and sensors' names as texts: HOST:PORT, ROWSxCOLUMNS, a name. This module needs no numpy."""
 
 from typing import NamedTuple
 
-SIDES = (2, 64)  # taxels of a grid's side, least and most
-NAME_CHARACTERS = 64  # of a sensor's name, at most
+SIDES = (2, 64)  # taxels: the least and the most that a side of a grid may have
+NAME_CHARACTERS = 64  # the most that a sensor's name may have
 NAME_LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-")
 
 

@@ -1,11 +1,11 @@
-"""Packets and a time in, facts out: every sensor of a scene, from the bytes that arrived to the events.
+"""The hub: all sensors of a scene, from packets and the time of their arrival to facts, such as events.
 
-The one path. The daemon, a replay, an export and a recording session differ only in where packets come from and in
-what they do with the facts. Nothing here has a socket, a clock, a log or a metric; times are seconds on one clock that
-never goes back, the daemon's monotonic one or a tape's own.
+Every program takes this path: the daemon, a replay, an export and a recording session differ only in where packets
+come from and in what they do with the facts. A hub has no socket, clock, log or metric; its times are seconds on one
+clock that never goes back, the daemon's monotonic one or a tape's own.
 
-A bug in the path of one sensor is a `Fault`: that sensor's contact is ended, and the other sensors go on. It is not
-raised, since a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
+A bug in the path of one sensor is not raised: it becomes a `Fault`, that sensor's contact is ended, and the other
+sensors go on, since a daemon in a vehicle must not die of one sensor's odd frame.
 """
 
 import math
@@ -25,35 +25,36 @@ from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.core.wire import Arrival, Block, Decoder
 
-FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
-REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
-HOSTS = 1024  # hosts of which it is remembered whether they may send
+FORGET_S = 60.0  # s; a sensor that has been silent for longer gives its place to one that sends
+REMEMBERED = 4096  # sensors that gave up their place and whose last sequence and id are remembered
+HOSTS = 1024  # hosts for which the answer of `Scene.may_send` is remembered
 
 
 class Hub:
     """All sensors of a scene."""
 
     def __init__(self, scene: Scene, classifier: Classifier, *, later: bool = False) -> None:
-        """`classifier` must know the scene's gestures (ValueError).
+        """A hub without sensors yet. Raises ValueError if the `classifier` does not know a gesture of the scene.
 
-        The model is run at once, or `later`: by `ask` and `look`, for whoever must not have answers of other sensors
-        wait for that. What has not been asked when its answer is due is asked then, so answers are the same.
+        With `later` the model runs only in `ask` and `look`, so that its runs do not delay the answers of other
+        sensors. A segment that nobody has asked about when its answer is due is asked about then, so the answers are
+        the same.
         """
         self._sensors: dict[str, Sensor] = {}
-        self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
+        self._numbers: dict[str, tuple[int, int]] = {}  # by sensor without a place: its last sequence and id
         self._banks = bank.Banks()
-        self._missed = False  # whether this machine had no room for a packet since packets were read last
-        # How many sensors each source owns that was heard within the last minute, as of the last tick.
+        self._missed = False  # whether this machine has had no room for a packet since the last `receive`
+        # How many sensors each source owned at the last tick; those that were silent for FORGET_S do not count.
         self.owners: Mapping[Source, int] = {}
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._ticked = -math.inf  # s, the last tick
-        # When `wait` will probably find something unless packets come before; infinite where there is nothing.
+        # s: `wait` finds nothing before this time, and from then on probably something; infinite if no sensor waits.
         self.due = math.inf
         self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
         self._later = later
-        self._armed: dict[str, float] = {}  # sensors that come armed, until so many s on this clock
-        self.gates = Gates(scene.gates)  # which a change of the scene leaves as they are
+        self._armed: dict[str, float] = {}  # by sensor that will come armed: until when, in s on the hub's clock
+        self.gates = Gates(scene.gates)  # a change of the scene leaves the gates as they are
         self.asks: dict[str, Sensor] = {}  # sensors that wait for `ask`, the one that has waited longest first
         self.looks: dict[str, Sensor] = {}  # the same for `look`
         self._set(scene, classifier)
@@ -61,7 +62,7 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
-        if self._missed:  # how many packets each sensor has missed is seen by their frames alone
+        if self._missed:  # only the next frame of each sensor shows whether it has missed packets
             self._banks.doubted, self._missed = set(self._sensors), False
         together = len(packets) >= bank.FEW
         waited: list[Sensor] = []
@@ -86,7 +87,7 @@ class Hub:
     def _read(
         self, packets: Sequence[tuple[bytes, Source]], now: float, facts: list[Fact], *, together: bool
     ) -> dict[str, list[Arrival]]:
-        """The frames of packets, by the names of the sensors that they may feed, without those that banks take."""
+        """The frames of packets, by the sensor that each may feed; frames that a bank has taken are left out."""
         if self.scene.allow:
             facts += [Dropped("not_allowed", source) for _, source in packets if not self._may_send(source[0])]
             packets = [packet for packet in packets if self._may_send(packet[1][0])]
@@ -112,7 +113,7 @@ class Hub:
         return waiting
 
     def wait(self, now: float) -> list[Fact]:
-        """No packets have come until `now`: contacts may be over."""
+        """Answer the contacts whose wait is over at `now`, though no packet has come since."""
         facts: list[Fact] = []
         if now >= self.due:
             for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.elapses_at):
@@ -124,7 +125,7 @@ class Hub:
         return facts
 
     def ask(self, now: float) -> list[Fact]:
-        """Have the model name what was shown first of all that may soon be answered: one run."""
+        """Run the model once, on the segment that has waited longest to be classified; its answer comes when due."""
         facts: list[Fact] = []
         while self.asks:
             sensor = self.asks.pop(next(iter(self.asks)))
@@ -134,9 +135,9 @@ class Hub:
         return facts
 
     def look(self, now: float) -> list[Fact]:
-        """Have the model look at the contact that has waited longest for it: one run, and perhaps a provisional event.
+        """Run the model once, on the open contact that has waited longest; this may give a provisional event.
 
-        What has not been looked at when its sensor's next frame comes is not said.
+        A look that was not taken when the sensor's next frame comes is dropped.
         """
         facts: list[Fact] = []
         while self.looks:
@@ -147,7 +148,10 @@ class Hub:
         return facts
 
     def tick(self, now: float) -> list[Fact]:
-        """What the time alone decides, once everything that arrived until `now` was received: `wait`, and silences."""
+        """Do all that the time alone decides: `wait`, sensors that fell silent, gates and arming that have run out.
+
+        Everything that arrived until `now` must have been received before.
+        """
         facts = [] if now < self.gates.due else self._lapse(now)
         facts += self.wait(now)
         sensors = self._sensors.values()
@@ -164,18 +168,18 @@ class Hub:
         return facts
 
     def flush(self, now: float) -> list[Fact]:
-        """No packet will come after `now`: open contacts are answered or cancelled."""
+        """Answer or cancel all open contacts, since no packet will come after `now`."""
         facts: list[Fact] = []
         for sensor in self._out(now, facts):
             sensor.end(now, facts)
         return facts
 
     def missed(self) -> None:
-        """This machine had no room for a packet. Each sensor's next frame shows whether it was one of that sensor's."""
+        """Note that this machine had no room for a packet; the sensors' next frames show whose packet it was."""
         self._missed = True
 
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
-        """Learn these sensors anew; their open contacts are cancelled. KeyError for one that is not there."""
+        """Learn these sensors anew and cancel their open contacts. Raises KeyError for a sensor that is not there."""
         facts = self.wait(now)  # a contact that is over is answered first
         self._out(now, facts)
         for name in sensors:
@@ -183,8 +187,8 @@ class Hub:
         return facts
 
     def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
-        """Go on in another scene; what was learned of a sensor stays where it holds. ValueError as for a new hub."""
-        facts = self.wait(now)  # what is over is answered as the scene before decides
+        """Go on in another scene; what was learned of a sensor stays if it still holds. ValueError as for a new hub."""
+        facts = self.wait(now)  # a contact that is over is answered by the scene before
         self._set(scene, classifier)
         for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)
@@ -192,7 +196,7 @@ class Hub:
         return facts
 
     def inhibit(self, sensor: str | None, gate: str, now: float, seconds: float = math.inf) -> list[Fact]:
-        """Close a gate for a sensor or (None) for all, and all that come, for so long or until it is opened.
+        """Close a gate for a sensor, or for all (None), even new ones, for so many seconds or until it is opened.
 
         While a gate is closed each contact is unknown, and so is one that began before it was closed or opened.
         """
@@ -205,7 +209,7 @@ class Hub:
         return self._shut(now)
 
     def put(self, sensor: str, closed: Iterable[str], now: float, armed_until: float | None = None) -> list[Fact]:
-        """Exactly these gates are closed for a sensor from now on; one that was not heard yet may come armed."""
+        """Close exactly these gates for a sensor; one that is not there yet will come armed until `armed_until` (s)."""
         self.gates.put(sensor, closed)
         if armed_until is not None:
             self._armed[sensor] = armed_until
@@ -214,7 +218,7 @@ class Hub:
     def foresee(self, sensors: Collection[str] | None) -> None:
         """Give provisional events of these sensors, by name, or of all (None). Answers stay what they are.
 
-        It costs up to 15 runs of the model a second and sensor while it is touched.
+        Each sensor that is touched costs up to 15 runs of the model a second.
         """
         self._foreseen = None if sensors is None else frozenset(sensors)
         for sensor in self._sensors.values():
@@ -236,7 +240,7 @@ class Hub:
         return self.scene.touch and (self._followed is None or name in self._followed)
 
     def number(self, name: str) -> tuple[int, int]:
-        """The next sequence and id of a sensor, for an event that is made up; they count as used."""
+        """The next sequence and id of a sensor, for the events of a test; both count as used."""
         if name in self._sensors:
             return self._sensors[name].count()
         sequence, number = self._numbers.get(name, (0, 0))
@@ -260,23 +264,23 @@ class Hub:
         }
 
     def states(self, now: float) -> dict[str, str]:
-        """The state of each sensor that `readings` has, at a fraction of the price."""
+        """The state of each sensor, as `readings` has it, in a fraction of the time."""
         silent = dict.fromkeys(self.scene.sensors, "no_data")
         return silent | {name: sensor.condition(self._as_of(sensor, now))[0] for name, sensor in self._sensors.items()}
 
     def _as_of(self, sensor: Sensor, now: float) -> float:
-        """When what is known of a sensor at `now` held: of one in a bank, when that was looked at last."""
+        """The time in s for which a sensor's state is known: `now`, or the last tick or packet of one in a bank."""
         return min(now, max(self._ticked, sensor.owner.heard)) if sensor.name in self._banks.homes else now
 
     def listening(self, now: float) -> list[Gate]:
-        """What gates and arming say at `now`, of the sensors of which they say anything."""
+        """The gates and the arming of each sensor at `now`, without the sensors that have neither."""
         heard = dict(self._sensors)
         unheard = [self._unheard(name, now).gate for name in self.scene.sensors if name not in heard]
         told = [*unheard, *(sensor.listens(now) for sensor in heard.values())]
         return [gate for gate in told if gate is not None and (gate.closed or gate.armed is not None)]
 
     def view(self, name: str, now: float, *, raw: bool) -> dict[str, Any] | None:
-        """A sensor as it is felt at `now`, as JSON values; None where it was not heard."""
+        """The last frame and the state of a sensor at `now`, as JSON values; None if it was not heard."""
         sensor = self._sensors.get(name)
         if sensor is None:
             return None
@@ -304,10 +308,10 @@ class Hub:
         if missing:
             known = ", ".join(classifier.gestures)
             raise ValueError(f"gestures: {', '.join(missing)} were asked for, the classifier knows {known}")
-        self.scene, self._classifier = scene, classifier  # that decide from now on
+        self.scene, self._classifier = scene, classifier
         self._decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=scene.touches)
         self._may_send = lru_cache(HOSTS)(scene.may_send)
-        self._full_until = -math.inf  # s; before that no stranger has been silent for long enough to lose its place
+        self._full_until = -math.inf  # s; until then no sensor has been silent for long enough to lose its place
 
     def _together(self, packets: Sequence[tuple[bytes, Source]], facts: list[Fact]) -> list[Block]:
         """The frames of packets that can be read together; after a bug each is read by itself."""
@@ -328,7 +332,7 @@ class Hub:
         return arrivals
 
     def _admits(self, name: str, source: Source, now: float, facts: list[Fact]) -> bool:
-        """Whether a `source` that has sent a frame may feed that sensor, which then is out of its bank."""
+        """Whether a `source` may feed the sensor of a frame; the sensor is made if it is new, and leaves its bank."""
         sensor = self._sensors.get(name) or self._new(name, source, now, facts)
         if sensor is None:
             return False
@@ -340,18 +344,18 @@ class Hub:
         return True
 
     def _out(self, now: float, facts: list[Fact]) -> list[Sensor]:
-        """All sensors, none of which is in a bank any more."""
+        """All sensors, after they have left their banks."""
         for name in tuple(self._banks.homes):
             self._leave(self._sensors[name], now, facts)
         return list(self._sensors.values())
 
     def _leave(self, sensor: Sensor, now: float, facts: list[Fact]) -> None:
-        """Have a sensor out of its bank, if it is in one; a bug in that is added to `facts`."""
+        """Take a sensor out of its bank, if it is in one; a bug in that is added to `facts`."""
         if sensor.name in self._banks.homes:
             sensor.run(self._banks.leave, now, facts)
 
     def _new(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
-        """A sensor that was not heard before, or None where there is no place for it."""
+        """A new sensor of that name, or None if there is no place for it."""
         if self._full(name, now, facts):
             facts.append(Dropped("too_many_sensors", source))
             return None
@@ -364,9 +368,9 @@ class Hub:
         return sensor
 
     def _full(self, name: str, now: float, facts: list[Fact]) -> bool:
-        """Whether there is no place for a new sensor; places for those of the scene are kept free.
+        """Whether there is no place for a new sensor; places for sensors that the scene names are kept free.
 
-        One packet can hold hundreds of names: where there is no place, they are not each held against all sensors.
+        One packet can hold hundreds of names, so `_full_until` spares a search of all sensors for each of them.
         """
         named = self.scene.sensors
         if name in named:
@@ -382,7 +386,7 @@ class Hub:
             self._full_until = now if longest is None else longest.owner.heard + FORGET_S
             return True
         self._leave(longest, now, facts)
-        longest.end(now, facts)  # its contact is open if no tick came in its silence, as where the process was stopped
+        longest.end(now, facts)  # its contact is still open if no tick came meanwhile, as in a process that was stopped
         self._forget(longest)
         return False
 

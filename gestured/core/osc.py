@@ -1,8 +1,8 @@
-"""Bytes -> OSC 1.0 (opensoundcontrol.org/spec-1_0): bounded, non-recursive, one error type.
+"""A parser of OSC 1.0 (opensoundcontrol.org/spec-1_0): bounded, not recursive, with one type of error.
 
 Whatever the bytes are, `decode` gives messages or raises `ProtocolError`, in time linear in their number.
-A sensor sends the same layout over and over: a packet that is laid out as one before is not parsed again, its
-values are read from where they must be. Type tags known: `i f d h t s b`.
+A sensor sends the same layout over and over, so a packet with a known layout is not parsed again: its values are
+read from their known places. Type tags known: `i f d h t s b`.
 
 Reasons: `not_osc` (no message, no bundle), `address` (not ASCII, too long), `types` (type tags missing or not
 known, a string that is not UTF-8), `truncated` (fewer bytes than the type tags need), `trailing` (more),
@@ -25,17 +25,19 @@ MAX_ADDRESS = 255  # bytes of an address
 MAX_TAGS = 4_352  # type tags of one message; a 64 x 64 frame has 4,097
 MAX_MESSAGES = 2_048  # messages of one packet
 MAX_DEPTH = 8  # bundles within bundles
-RUN = 4  # `i` or `f` in a row from which on they come as one array
+RUN = 4  # so many `i` or `f` in a row, or more, become one array
 
 _BUNDLE = b"#bundle\0"
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
-_SLOTTED = ("", "s", "r", "sr", "b", "sb")  # arguments that have a `Slot`: scalars, a run, a blob that is not empty
-LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
-SLOT_BYTES = 600  # that Python takes for a slot, its head, address, type tags and scalars not counted
-SCALAR_BYTES = 48  # that Python takes for a scalar in a slot
-# Where a packet's first head begins. In a bundle the message's size stands before it. A short head is in it whole.
+# Kinds of arguments that a `Slot` can describe: s, scalars; r, a run of numbers; b, a blob that is not empty.
+_SLOTTED = ("", "s", "r", "sr", "b", "sb")
+LAYOUTS_BYTES = 8 << 20  # memory for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
+SLOT_BYTES = 600  # memory that Python takes for a slot, without its head, address, type tags and scalars
+SCALAR_BYTES = 48  # memory that Python takes for a scalar in a slot
+# The bytes at which a packet's first head begins, enough for the whole of a short head. In a bundle the message's size
+# stands before the head.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
 _TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
@@ -82,7 +84,7 @@ class Slot(NamedTuple):
     """Where one message stands in a packet of a known layout: scalars, then a run of numbers or a blob, or none."""
 
     start: int  # byte at which the head begins
-    head: bytes  # address and type tags, padded; in a bundle the size before them
+    head: bytes  # address and type tags, padded; in a bundle with the message's size before them
     address: str
     types: str
     unpack: Callable[[bytes, int], tuple[Any, ...]] | None  # reads the scalars
@@ -104,7 +106,7 @@ class Layout:
 
     def __init__(self, length: int, slots: list[Slot]) -> None:
         self.length, self.slots = length, slots
-        self.meaning: Any = None  # what whoever reads such packets has found out about them
+        self.meaning: Any = None  # what `wire.Decoder` has found out about such packets; None before it looked
 
 
 _new = tuple.__new__  # Message(...) takes twice the time
@@ -112,7 +114,7 @@ _frombuffer = np.frombuffer
 
 
 class Layouts:
-    """The layouts that are known. Hostile senders invent new ones, so when their room is full all are forgotten."""
+    """The layouts that are known. Hostile senders invent new ones, so all are forgotten when their memory is used."""
 
     def __init__(self, most_bytes: int = LAYOUTS_BYTES) -> None:
         self._most_bytes = self._room = most_bytes
@@ -123,7 +125,7 @@ class Layouts:
         return len(self._known)
 
     def find(self, data: bytes) -> Layout | None:
-        """The layout of a packet, None where it is not known; what a blob's size says is not looked at."""
+        """The layout of a packet, None where it is not known. The size that a blob gives is not compared."""
         begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
         layout = self._known.get(begin) or self._known.get(_key(begin))
         if layout is None or layout.length != len(data):
@@ -134,7 +136,7 @@ class Layouts:
         return layout
 
     def guess(self, packets: Iterable[bytes]) -> list[Layout | None]:
-        """The layout of each packet, or that of another one: whoever asks has to compare lengths and heads."""
+        """The layout that each packet may have, or None; the caller has to compare its length and heads."""
         known = self._known.get
         begins = [data[BUNDLED if data.startswith(_BUNDLE) else ALONE] for data in packets]
         return [known(begin) or known(_key(begin)) for begin in begins]
@@ -161,7 +163,7 @@ class Layouts:
         """Remember the layout of a packet: messages in these slots, and nothing else."""
         cost = 0
         for slot in slots:
-            rest = slot.length if slot.dtype is not None else slot.length > 0  # type tags of the run, or the blob
+            rest = slot.length if slot.dtype is not None else slot.length > 0  # tags that are no scalar's
             cost += SLOT_BYTES + 3 * len(slot.head) + SCALAR_BYTES * (len(slot.types) - rest)
         if cost > self._room:
             self._known.clear()
@@ -173,7 +175,7 @@ class Layouts:
 def _key(begin: bytes) -> bytes:
     """The key of a layout: the first address and type tags, without the values after them, which change.
 
-    Where `begin` ends within the type tags, as in a frame of floats, all of it is the key.
+    If `begin` ends within the type tags, as in a frame of floats, the whole of `begin` is the key.
     """
     end = begin.find(b"\0", begin.find(b","))
     return begin if end < 0 else begin[:end]
@@ -182,11 +184,11 @@ def _key(begin: bytes) -> bytes:
 def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layouts | None = None) -> list[Message]:
     """All messages of a packet, bundles flattened, in order.
 
-    Raises ProtocolError at the first fault; where `errors` is given, puts faults there instead and keeps
-    every sound message. `layouts` remembers how packets are laid out, so that the next ones cost less.
+    Raises ProtocolError at the first fault; with `errors` it adds the faults to that list instead and keeps every
+    sound message. `layouts` remembers how packets are laid out, so that the next ones cost less.
     """
     if type(data) is not bytes:
-        data = bytes(data)  # arrays are views of it: it must not change under their reader
+        data = bytes(data)  # the arrays are views of these bytes, which must not change
     bundled = data[:8] == _BUNDLE
     if layouts is not None and (known := layouts.read(data, bundled)) is not None:
         return known
@@ -203,7 +205,7 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layo
         if errors is None:
             raise
         errors.append(error)
-    if layouts is not None and 0 < len(slots) == len(messages) and not errors:  # strings, inner bundles have none
+    if layouts is not None and 0 < len(slots) == len(messages) and not errors:  # messages with strings have no slot
         layouts.remember(data, slots, bundled)
     return messages
 
@@ -231,7 +233,7 @@ def _bundle(data: bytes, messages: list[Message], slots: list[Slot], errors: lis
             bundles += 1
             end, time, number = at + size, timetag(data, at + 8, at + size), bundles
             slots.clear()
-            slots = []  # such a packet is read anew each time
+            slots = []  # so the layout of a packet with inner bundles is not remembered
             at += 16
             continue
         seen += 1
@@ -251,7 +253,7 @@ def _message(
 ) -> Message:
     """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
 
-    Where it has only scalars and a run or a blob after them, its slot is added to `slots`.
+    If its arguments are of a kind in `_SLOTTED`, its slot is added to `slots`.
     """
     address, types, at = _head(data, start, end)
     head = data[begin:at]
@@ -296,7 +298,7 @@ def _head(data: bytes, start: int, end: int) -> tuple[str, str, int]:
     """Address, type tags, and where the arguments begin. Raises ProtocolError."""
     if not data.startswith(b"/", start):
         raise ProtocolError("not_osc", "neither an OSC message nor a bundle")
-    comma = data.find(b",", start, end)  # no address holds one: it begins the type tags
+    comma = data.find(b",", start, end)  # no address holds a comma, so this one begins the type tags
     name_end = data.find(b"\0", start, comma) if comma >= 0 else -1
     if name_end < 0 or name_end + 4 - (name_end - start) % 4 != comma:
         raise ProtocolError("types", "no type tags after the address")

@@ -1,7 +1,7 @@
-"""One sensor: its frames in, events out, and what was decided.
+"""One sensor: its frames in, its events out.
 
 `t` is seconds on the stream's clock, by which everything is decided; `now` is seconds on the hub's clock, by which
-frames arrive. Whoever has no arrivals (`gestured.open`, the lab) uses `push`, `wait`, `flush`, `reset` and `due` alone.
+frames arrive. A caller without arrivals (`gestured.open`, the lab) uses only `push`, `wait`, `flush`, `reset`, `due`.
 """
 
 import math
@@ -28,9 +28,9 @@ from gestured.core.timing import outside
 from gestured.core.where import where
 from gestured.core.wire import Arrival
 
-ABSENT_S = 60.0  # of silence, after which a sensor that sends only while it is touched counts as stale
-HELD_S = 60.0  # on the hub's clock: a contact that lasts longer is given up, whatever the sensor's own clock says
-NOBODY: Source = ("", 0)  # who feeds a sensor that is in no hub
+ABSENT_S = 60.0  # s of silence, after which a sensor that sends only while it is touched counts as stale
+HELD_S = 60.0  # s on the hub's clock; a contact that lasts longer is given up, whatever the sensor's own clock says
+NOBODY: Source = ("", 0)  # the source of a sensor that is in no hub
 
 Told = Event | Decided
 
@@ -40,9 +40,9 @@ _new = tuple.__new__  # Arrived(...) takes twice the time
 class Sensor:
     """One sensor of a scene. `classifier` may be replaced between two frames.
 
-    The classifier is asked while the segmenter still waits whether the finger stays off, so that the answer is there
-    when the wait is over. Where the finger comes back, that answer is thrown away. Where somebody asks for provisional
-    events, the classifier is asked about contacts that are not over as well; no answer depends on that.
+    The classifier is asked while the segmenter still waits to see whether the finger stays off, so that its answer is
+    there when the wait is over. If the finger comes back, that answer is thrown away. If somebody asks for provisional
+    events, the classifier is also asked about contacts that are not over; no answer depends on that.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Sensor:
         source: Source = NOBODY,
         numbers: tuple[int, int] = (0, 0),
     ) -> None:
-        """`numbers`: the last sequence and the last id that the sensor has used before."""
+        """A sensor that was not heard yet. `numbers`: the last sequence and id that a sensor of this name has used."""
         self.name, self.classifier = name, classifier
         self.owner = Owner(source)
         self.silent = False  # whether the stream has ended or paused, and was flushed
@@ -63,27 +63,27 @@ class Sensor:
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self.stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = (
-            None  # the last one, of what, and its answers
+            None  # the classifier and the segment of the last question, and its answers
         )
-        self.shown: Segment | None = None  # what `ask` is to ask about
+        self.shown: Segment | None = None  # the segment that `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
-        # Whether looks for provisional events wait until `look`; and where nobody asks for these, the model's runs for
-        # answers until `ask`, or until the answer is due.
+        # Whether runs of the model wait: those for provisional events until `look`; those for answers until `ask` or
+        # until the answer is due, unless somebody asks for provisional events.
         self._later = False
         self.habits, self.vitals = Habits(*self.front_end.grid_sent), Vitals()
-        self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
-        self._fresh = True  # no frame was used since it came or restarted
+        self._square = self.front_end.rows == self.front_end.columns  # if so, idle frames tell `habits` nothing
+        self._fresh = True  # whether no frame was used since the sensor came or restarted
         self._open: int | None = None  # id of the contact that was not released yet
         self._answered = True  # whether that contact has its answer
-        self._since = 0.0  # s, on the hub's clock: when the frame arrived that opened it
+        self._since = 0.0  # s, on the hub's clock: when the frame that opened it arrived
         self._lost = 0  # frames that went missing so far
-        self._lost_at: float | None = None  # s, on the hub's clock: when the last of them did
+        self._lost_at: float | None = None  # s, on the hub's clock: when the last of them went missing
 
     # --- by the stream's time
 
     def push(self, frame: Frame) -> list[Told]:
-        """Take one frame, give what it decides; see `FrontEnd.push`."""
+        """Take one frame and return the events that it decides; see `FrontEnd.push`."""
         front_end, foresight = self.front_end, self._foresight
         told = self._late(frame.t) if foresight.asked else []
         if self._listening.armed:
@@ -105,8 +105,8 @@ class Sensor:
 
     @property
     def due(self) -> float | None:
-        """When `wait` will have something to say unless a frame comes before, in s; None where nothing waits."""
-        off = self._foresight.due(self.front_end)  # that a finger is off shows before a contact is over
+        """When `wait` will have something to say unless a frame comes before, in s; None if nothing waits."""
+        off = self._foresight.due(self.front_end)  # it comes before the end of the wait of the segmenter
         if off is None:
             return self.front_end.due
         return off if off <= self.front_end.pace.sure else None
@@ -116,7 +116,7 @@ class Sensor:
         return self._late(t) + self._tell(self.front_end.wait(t))
 
     def flush(self, t: float) -> list[Told]:
-        """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
+        """The stream paused or ended at `t` s: decide what can be decided, and cancel the rest."""
         return self._late(t) + self._tell(self.front_end.flush(t))
 
     def reset(self) -> list[Told]:
@@ -125,20 +125,20 @@ class Sensor:
         return self._tell(self.front_end.reset())
 
     def lapse(self, t: float) -> list[Told]:
-        """Whether the sensor is no longer armed at `t` s."""
+        """The `Gate` event if the sensor has ceased to be armed by `t` s."""
         onset = self.front_end.segmenter.onset if self.front_end.segmenter.phase.pending else None
         return [self._gate(t)] if self._listening.lapse(t, onset) else []
 
     def gate(self, closed: Mapping[str, float], t: float, past: float | None = None) -> list[Told]:
-        """These gates are closed from `t` s on, and no others; by name: when each opens by itself, on the hub's clock.
+        """Close these gates at `t` s and open all others; `closed`: by name, when it opens by itself (hub's clock, s).
 
-        What was felt until `past` (`t` unless told) began before that.
+        A contact that began by `past` (s, by default `t`) counts as begun before that.
         """
         told = [*(self._fingers.end() if closed else ()), *self.wait(t)]
         return [*told, self._gate(t)] if self._listening.gate(closed, t if past is None else past) else told
 
     def _gate(self, t: float) -> Gate:
-        """What the sensor listens to since `t` s, on the hub's clock."""
+        """The event that says what the sensor listens to since `t` s; the times in it are on the hub's clock."""
         when = self.stamper.when
         return self._listening.told(self.name, when(t), when(self._listening.armed_until))
 
@@ -165,14 +165,14 @@ class Sensor:
         return told
 
     def ask(self) -> list[Told]:
-        """Find out all that an answer to what was shown will say. Nothing is told of that before the answer is due."""
+        """Ask the classifier about the segment that was shown. No events follow before the answer is due."""
         if self.shown is not None:
             self._ask(self.shown)
         self.shown = None
         return []
 
     def _ask(self, segment: Segment) -> tuple[Scores | None, Where]:
-        """The classifier's scores of a segment, None where it fails, and where it was. It is asked about once."""
+        """The classifier's scores of a segment, None if it fails, and where the segment was; found out only once."""
         asked = self._asked
         if asked is None or asked[0] is not self.classifier or asked[1] is not segment:
             try:
@@ -204,7 +204,7 @@ class Sensor:
         recognised = best if known or own is not None else None
         why = listening.refusal(segment.onset, recognised)
         if why is None and recognised is None:
-            # At a rate that the model does not know, holes and low confidence follow from the rate, so that is told.
+            # At a rate that the model does not know, holes and low confidence follow from the rate: it is the reason.
             why = "rate" if outside(self.front_end.rate_hz) else "confidence" if seen else "hole"
         if why is not None:
             gates = listening.silenced if why == INHIBITED else ()
@@ -223,7 +223,7 @@ class Sensor:
         return self._foresight.judged(Cancelled(self.name, self.segments, why))
 
     def _late(self, t: float) -> list[Told]:
-        """The provisional event, if any, of a finger that is off because no frame has come until `t` s."""
+        """The provisional event, if any, of a finger that is off, as shows because no frame has come until `t` s."""
         self._foresight.wait(self.front_end, min(t, self.front_end.pace.sure))
         return self._at_once()
 
@@ -231,7 +231,7 @@ class Sensor:
         return [] if self._later or self._foresight.wanted is None else self.look()
 
     def look(self) -> list[Told]:
-        """The provisional event, if any, of the contact that goes on. It costs one run of the model at most."""
+        """The provisional event, if any, of the open contact. It costs one run of the model at most."""
         return self._foresee(self._foresight.look(self.front_end))
 
     def _foresee(self, preview: Preview | None) -> list[Told]:
@@ -259,28 +259,28 @@ class Sensor:
     # --- by the hub's time: what is found is added to `facts`
 
     def count(self) -> tuple[int, int]:
-        """The next sequence and id, for an event that is made up; they count as used."""
+        """The next sequence and id, for the events of a test; both count as used."""
         self.sequence += 1
         self.segments += 1
         return self.sequence, self.segments
 
     @property
     def calm(self) -> bool:
-        """Whether an idle frame says nothing but that the sensor is idle; see `FrontEnd.calm`."""
+        """Whether an idle frame would say only that the sensor is idle; see `FrontEnd.calm`."""
         waits = self._listening.armed or self._foresight.wanted is not None or self.habits.falling
         return self.front_end.calm and not waits and not self._scene.frames
 
     def run(self, act: Callable[["Sensor"], Sequence[Told] | None], now: float, facts: list[Fact]) -> None:
-        """Have something done with the sensor at `now` (s): what it tells, or a bug in it, is added to `facts`."""
+        """Call `act` with the sensor at `now` (s), and add to `facts` what it returns, or the bug in it."""
         try:
             self._add(act(self) or (), now, facts)
         except Exception as error:
             self._recover(error, self.stamper.at(now), facts)
 
     def receive(self, arrivals: Sequence[Arrival], now: float, facts: list[Fact], *, missed: bool = False) -> float:
-        """Take frames that were found waiting at `now`; gives `elapses_at` as it is then.
+        """Take frames that were found waiting at `now` (s); returns `elapses_at` as it is after them.
 
-        `missed`: this machine may have had no room for others.
+        `missed`: this machine may have had no room for frames just before these.
         """
         try:
             stamps = self.stamper.stamp(arrivals, now, missed=missed)
@@ -320,16 +320,16 @@ class Sensor:
 
     @property
     def elapses_at(self) -> float:
-        """When `elapse` will find something unless a frame comes before; infinite where nothing waits."""
-        due = None if self._open is None else self.due  # nothing waits where there is no contact
+        """When `elapse` will find something unless a frame comes before, in s; infinite if nothing waits."""
+        due = None if self._open is None else self.due  # nothing waits without a contact
         return math.inf if due is None else self.stamper.when(due)
 
     def elapse(self, now: float, facts: list[Fact]) -> None:
-        """No frame has come until `now`: a contact may be over."""
+        """No frame has come until `now` (s): a contact may be over."""
         self._run(self.wait, now, facts)
 
     def end(self, now: float, facts: list[Fact]) -> None:
-        """The sensor has nothing more to say: what is open is answered or cancelled."""
+        """The sensor has fallen silent: its open contact is answered or cancelled."""
         self.silent = True
         self.vitals.silent()
         self._run(self.flush, now, facts)
@@ -362,9 +362,9 @@ class Sensor:
     def shut(
         self, closed: Mapping[str, float], now: float, facts: list[Fact], armed_until: float | None = None
     ) -> None:
-        """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock.
+        """Close these gates at `now` and open all others; `closed`: by name, when it opens by itself (hub's clock, s).
 
-        With `armed_until` the sensor is new, and what it listens to is told in any case, unless it is everything.
+        With `armed_until` the sensor is new, and a `Gate` event is given in any case, unless the sensor always listens.
         """
         if armed_until is not None and armed_until > -math.inf:
             self._listening.arm(armed_until)
@@ -374,15 +374,15 @@ class Sensor:
             facts.append(self._gate(self.stamper.at(now)))
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:
-        """Say of contacts from now on, or no longer, what they will most probably be.
+        """Give provisional events from now on, or no longer.
 
-        The model is run at once, or `later`: by `look`, where `looks` is true. A frame that was not looked at when the
+        The model is run at once, or `later`: by `look`, when `looks` is true. A frame that was not looked at when the
         next one comes gives no provisional event.
         """
         self._foresight.asked, self._later = asked, later
 
     def follow(self, facts: list[Fact], *, asked: bool) -> None:
-        """Tell of each finger from now on, or no longer; then those that are down are up, in `facts`."""
+        """Give touch events from now on, or no longer; then `facts` gets an `up` for each finger that is down."""
         if not asked:
             facts += self._fingers.end()
         self._fingers.asked = asked
@@ -393,7 +393,7 @@ class Sensor:
         return self._foresight.wanted is not None
 
     def review(self, now: float, facts: list[Fact]) -> None:
-        """Look at what need not be looked at with each frame; called with each tick."""
+        """Do what is not needed with each frame; called with each tick, at `now` (s)."""
         self.vitals.review(self.front_end)
         if self._listening.armed:
             self._run(self.lapse, now, facts)
@@ -403,7 +403,7 @@ class Sensor:
         return now - self.owner.heard > self._scene.stale_s
 
     def condition(self, now: float) -> tuple[str, str]:
-        """How the sensor is, and why; see `Reading`."""
+        """The state of the sensor, and the reason for it; see `Reading`."""
         if self.vitals.intermittent and now - self.owner.heard <= ABSENT_S:
             return "intermittent", ""
         if self.stale(now):
@@ -411,7 +411,7 @@ class Sensor:
         return self.vitals.condition(self.front_end, inverted=self.habits.inverted)
 
     def listens(self, now: float) -> Gate | None:
-        """What gates and arming say at `now`; None of a sensor that always listens."""
+        """The gates and the arming at `now` (s); None for a sensor that always listens."""
         always = not self._listening.closed and self._listening.arming is None
         return None if always else self._gate(self.stamper.at(now))
 
@@ -442,7 +442,7 @@ class Sensor:
         )
 
     def view(self, now: float, *, raw: bool) -> dict[str, Any] | None:
-        """The sensor as it is felt at `now`, as JSON values; None before its first frame."""
+        """The sensor's last frame and its state at `now` (s), as JSON values; None before its first frame."""
         felt = view_of(self.front_end, raw=raw)
         return felt and {"sensor": self.name, "state": self.condition(now)[0], **felt, "contact": self._open}
 
@@ -450,7 +450,7 @@ class Sensor:
         self.run(lambda _: act(self.stamper.at(now)), now, facts)
 
     def _recover(self, error: Exception, t: float, facts: list[Fact]) -> None:
-        """After a bug: start clean, and end what consumers believe to be open."""
+        """After a bug: start clean, and end the contact that consumers believe to be open."""
         facts.append(Fault(self.name, error))
         try:
             facts += self._fingers.end()
@@ -464,7 +464,7 @@ class Sensor:
             self._open = None
 
     def _add(self, told: Sequence[Told], now: float, facts: list[Fact]) -> None:
-        """Add events to `facts`, and remember which contact is open for those who read them."""
+        """Add events to `facts`, and remember which contact is open by what they say."""
         for one in told:
             if isinstance(one, Onset):
                 self._open, self._answered, self._since = one.id, False, now

@@ -1,4 +1,4 @@
-"""When the frames of a sensor were felt: stamps for what arrives bunched, late, twice or out of order."""
+"""Stamps of a sensor's frames: when each was felt, though frames arrive bunched, late, twice or out of order."""
 
 import math
 from collections import deque
@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from gestured.core.wire import Arrival
 
 Counted = tuple[int, Literal["", "duplicate", "late"], bool]
-ONE: Counted = (1, "", False)  # what the counter says of a frame that has none
+ONE: Counted = (1, "", False)  # a frame without a counter counts as the one after the last
 _new = tuple.__new__  # Stamp(...) takes twice the time
 
 
@@ -19,27 +19,28 @@ class Stamp(NamedTuple):
     lost: int  # frames that went missing just before this one
     dropped: Literal["", "duplicate", "late"]  # why the frame must not be used
     restarted: bool  # the sensor began anew: what was learned of it no longer holds
-    implausible: bool  # clock "sensor": the time tag was missing or impossible, the arrival counts
+    implausible: bool  # clock "sensor": the time tag was missing or impossible, so the arrival was used
 
 
 class Stamper:
-    """When the frames of one sensor were felt.
+    """What gives the frames of one sensor their times.
 
-    `clock` "arrival": when they arrived. "sensor": by the increments of the time tags, as long as these go
-    forward by at most `MAX_STEP_S`; else by the arrival. Frames of one call that have one time are spaced
-    backwards from it at the rate seen so far (`PERIOD_S` apart until it is known), by the counter or evenly, and
-    never before the last frame. So read all waiting packets before you stamp: a stall then does no harm.
+    With the `clock` "arrival", a frame was felt when it arrived. With "sensor", its time is the last one plus the
+    step of the time tags, if that is forward and at most `MAX_STEP_S`; else the arrival is used. Frames of one call
+    that share a time are spaced backwards from it at the rate seen so far (`PERIOD_S` apart until that is known), by
+    the counter or evenly, and never before the last frame. So stamp all waiting frames in one call: a stall then
+    does no harm.
     """
 
     PERIOD_S = 1 / 15  # between frames at the nominal rate
-    MAX_STEP_S = 10.0  # between two time tags; a longer step is not believed
-    AHEAD_S = 86_400.0  # a recording may be sent faster than it was felt, but a day ahead of its arrival is no time
-    MIN_STEP_S = 1e-6  # between stamps where the clock stood still; a double tells them apart even after 30 years
+    MAX_STEP_S = 10.0  # a longer step from one time tag to the next is not believed
+    AHEAD_S = 86_400.0  # a recording may be sent faster than it was felt, but a stamp a day after its arrival is wrong
+    MIN_STEP_S = 1e-6  # between stamps if the clock stood still; a double tells them apart even after 30 years
     REORDER = 16  # a frame whose counter is further back was not overtaken on its way: the sensor began anew
-    REORDER_S = 0.5  # a counter that goes back after a longer pause: the sensor began anew
-    STREAK = 3  # so many late frames in a row whose counters rise by one: the sensor began anew
-    RECENT = 15  # intervals of which the usual one is taken: a second of a sensor at 15 Hz
-    LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
+    REORDER_S = 0.5  # if a counter goes back after a longer pause, the sensor began anew
+    STREAK = 3  # if the counters of so many late frames in a row rise by one, the sensor began anew
+    RECENT = 15  # the usual interval is the median of so many, a second of a sensor at 15 Hz
+    LEAP = 10_000  # if a counter jumps further (ten seconds at 1000 Hz), the sensor began anew, and nothing was lost
 
     def __init__(self, clock: Literal["arrival", "sensor"] = "arrival") -> None:
         self.by_tag = clock == "sensor"
@@ -47,18 +48,18 @@ class Stamper:
         self.last: float | None = None  # s, the last stamp
         self.arrived = 0.0  # s, the arrival of the frame that was stamped last
         self.tag: float | None = None  # s, the time tag of that frame
-        self.ahead = 0.0  # s by which that frame's time is beyond its tag, which an earlier frame had, too
+        self.ahead = 0.0  # s by which that frame's stamp lies beyond its tag, if an earlier frame had the same tag
         self.counter: int | None = None  # of the newest frame
-        self.late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
+        self.late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many of them came in a row
 
     def at(self, arrived: float) -> float:
-        """The stream's time when frames that `arrived` then (s) were felt: the last stamp plus what passed since."""
+        """The stream's time in s of a frame that `arrived` then (s): the last stamp plus the time since its arrival."""
         return arrived if self.last is None else self.last + max(0.0, arrived - self.arrived)
 
     def past(self, arrived: float) -> float:
-        """The stream's time by which everything that was felt had arrived at `arrived` (s).
+        """The stream's time in s until which every frame had arrived at `arrived` (s).
 
-        A sensor's own clock is known by its frames alone, and may have stood still since the last one.
+        A sensor's own clock is known only by its frames, and may have stood still since the last one.
         """
         return self.last if self.by_tag and self.last is not None else self.at(arrived)
 
@@ -69,8 +70,8 @@ class Stamper:
     def stamp(self, arrivals: Sequence[Arrival], arrived: float, *, missed: bool = False) -> list[Stamp]:
         """One stamp for each of this sensor's frames that were waiting when they `arrived`, in s.
 
-        `missed`: packets may have been lost on this machine just before. A counter tells how many were this
-        sensor's; without one, what fits into the pause counts as lost.
+        `missed`: packets may have been lost on this machine just before. A counter tells how many of them were this
+        sensor's; without a counter, as many frames count as lost as fit into the pause.
         """
         if len(arrivals) == 1 and not missed:
             return [self._alone(arrivals[0], arrived)]
@@ -100,7 +101,7 @@ class Stamper:
         steps, dropped, restarted = ONE
         _, _, counter, tag, _ = arrival
         before = self.counter
-        if counter is not None and before is not None and counter - before == 1:  # nearly all frames come in turn
+        if counter is not None and before is not None and counter - before == 1:  # true of nearly all frames
             self.counter, self.late = counter, (0, 0)
         elif counter is not None or before is not None:
             steps, dropped, restarted = self._count(counter, arrived - self.arrived)
@@ -170,11 +171,11 @@ class Stamper:
         """Seconds since the `last` stamp by the time tag, or else by the arrival; and whether the tag is impossible."""
         step = tag - self.tag if tag is not None and self.tag is not None else 0.0
         if 0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S:
-            ahead = self.ahead if self.ahead <= self.REORDER_S else 0.0  # a clock that stood for longer lost that time
+            ahead = self.ahead if self.ahead <= self.REORDER_S else 0.0  # a clock that stood longer has lost that time
             self.ahead = max(ahead - step, 0.0)
             return max(step - ahead, 0.0), False
         waited = arrived - self.arrived
-        # A coarse clock shows one time for several frames; what they were put beyond it is no step of the clock.
+        # A coarse clock shows one time for several frames. Their stamps go beyond it, and that is no step of the clock.
         self.ahead = self.ahead + waited if tag is not None and tag == self.tag else 0.0
         return waited, tag is None or self.tag is not None
 

@@ -1,6 +1,6 @@
-"""Packets to the frames that arrived in them, with their touches.
+"""The decoder of packets: from OSC messages to the frames of sensors, with their touches.
 
-Reasons of the ProtocolErrors here: those of `osc`, `address` (none of ours), `types`, `size` (not the grid of
+Reasons of the ProtocolErrors here: those of `osc`, `address` (no sensor's), `types`, `size` (not the grid of
 the sensor), `not_finite`, `too_many_touches`.
 """
 
@@ -20,12 +20,12 @@ from gestured.core.errors import ProtocolError
 from gestured.core.frames import Touch
 from gestured.core.osc import Argument, Layout, Layouts, Message, Slot
 
-MAX_TOUCHES = 3
+MAX_TOUCHES = 3  # touches of one trajectory message
 # How the values of a blob are encoded, by its bytes for each taxel; a blob of any other size is refused.
 _BLOBS: dict[float, np.dtype[Any]] = {4: np.dtype(">f4"), 2: np.dtype(">u2"), 1: np.dtype(">u1")}
 _MAX_ROUTES = 4096  # addresses that are remembered; a sensor has one or two, so 2000 sensors have room
-_MAX_PENDING = 256
-FEW = 4  # packets that are laid out alike, from which on reading them together is cheaper
+_MAX_PENDING = 256  # sensors whose touches wait for a frame: a sender could invent names without end
+FEW = 4  # from so many packets of one form on, reading them together is cheaper
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Addresses:
             raise ValueError(f"trajectory: {self.trajectory!r} cannot be told from pressure {self.pressure!r}")
 
     def match(self, address: str) -> tuple[str, str] | None:
-        """`("pressure" or "trajectory", sensor)`, or None for an address that is not ours."""
+        """`("pressure" or "trajectory", sensor)`, or None for an address that is no sensor's."""
         for kind, pattern in (("pressure", self.pressure), ("trajectory", self.trajectory)):
             before, after = pattern.split("{sensor}")
             name = address[len(before) : len(address) - len(after)]
@@ -88,20 +88,20 @@ class Arrival(NamedTuple):
 class Block(NamedTuple):
     """The frames of n packets, all of one grid, with counters and time tags or all without."""
 
-    packets: list[int]  # their places among all that were found waiting, which rise
+    packets: list[int]  # the packets' indices among all that were found waiting, in rising order
     sensors: list[str]
     values: NDArray[np.float32] | NDArray[np.float64]  # (n, R, C) counts, as in `Arrival`
     counters: NDArray[np.int64] | None
     tags: NDArray[np.float64] | None  # s since the Unix epoch; NaN for "immediately"
 
     def only(self, places: NDArray[np.intp]) -> "Block":
-        """Those frames of it that stand in these places."""
+        """The block of the frames in these places of this one."""
         packets, sensors = ([each[n] for n in places.tolist()] for each in (self.packets, self.sensors))
         counters = None if self.counters is None else self.counters[places]
         return Block(packets, sensors, self.values[places], counters, None if self.tags is None else self.tags[places])
 
     def arrival(self, n: int) -> Arrival:
-        """One of them by itself."""
+        """The frame in place `n`, by itself."""
         counter = None if self.counters is None else int(self.counters[n])
         tag = None if self.tags is None or math.isnan(self.tags[n]) else float(self.tags[n])
         return Arrival(self.sensors[n], self.values[n], counter, tag, ())
@@ -117,14 +117,14 @@ class _Route(NamedTuple):
 
 
 class _Meaning(NamedTuple):
-    """What packets of one layout hold that have one frame, and beside it nothing that is wanted."""
+    """What a packet of one layout means, if it holds one frame and nothing else that is wanted."""
 
     route: _Route
     slot: Slot  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
-    form: int  # the same for packets whose heads and frames stand in the same places, of the same type and grid
-    heads: bytes  # of all its messages
-    places: tuple[slice, ...]  # in a packet, of each of them
+    form: int  # the same number for layouts with heads and frame in the same places, of the same type and grid
+    heads: bytes  # the heads of all its messages, joined
+    places: tuple[slice, ...]  # where each of these heads stands in the packet
 
 
 class Decoder:
@@ -141,7 +141,7 @@ class Decoder:
         self._keep_touches = keep_touches
         self._layouts = Layouts()
         self._route = lru_cache(_MAX_ROUTES)(self._find_route)
-        self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, which is compared faster
+        self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, since numbers compare faster
         self._numbers = count()
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 
@@ -172,10 +172,10 @@ class Decoder:
         return (self._join(found, source) if touched else arrivals), errors
 
     def together(self, packets: Sequence[bytes]) -> list[Block]:
-        """The frames of packets that are laid out as some before them; of one block for each kind of frames.
+        """The frames of packets whose layouts are known, in one block for each kind of frames.
 
-        They are what `decode` gives of each packet, at a fraction of the price. A packet that is in no block is for
-        `decode`: it is laid out in another way than its neighbours, or its frame is not finite.
+        A block holds what `decode` gives of each of its packets, in a fraction of the time. The caller has to give
+        `decode` the packets that are in no block: few others are laid out as they are, or a value is not finite.
         """
         alike: dict[int, list[tuple[int, _Meaning]]] = {}
         for i, layout in enumerate(self._layouts.guess(packets)):
@@ -194,7 +194,7 @@ class Decoder:
         return [_joined(blocks) for blocks in found.values()]
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
-        """What packets of a layout hold; False where each of them has to be read by itself."""
+        """The meaning of packets of a layout; False if each of them has to be read by itself."""
         routes = [self._route(slot.address, slot.types) for slot in layout.slots]
         frames = [(r, p) for r, p in zip(routes, layout.slots, strict=True) if r.grid is not None]
         if self._keep_touches or any(route.fault for route in routes) or len(frames) != 1:
@@ -293,7 +293,7 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 
 def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
-    """The finite frames of packets whose `form` may be the same, of those that have the heads which it says."""
+    """The finite frames of packets that may be of one form; packets with other heads are left out."""
     found, meanings = zip(*members, strict=True)
     route, slot, dtype, _, _, places = meanings[0]
     assert route.grid is not None
@@ -321,7 +321,7 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
 
 
 def _joined(blocks: list[Block]) -> Block:
-    """The frames of several blocks as one, in the order of their packets: names of other lengths make other forms."""
+    """Several blocks as one, in the order of their packets; sensors' names of different lengths make several forms."""
     if len(blocks) == 1:
         return blocks[0]
     packets, sensors, values, counters, tags = zip(*blocks, strict=True)
