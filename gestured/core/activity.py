@@ -1,6 +1,6 @@
-"""How strongly a frame is pressed and where, in units of the sensor's noise.
+"""Activity: how strongly a frame is pressed, in units of the sensor's noise, and where.
 
-Nothing here smooths over time: at 15 Hz a tap is one to three frames.
+Frames are not smoothed over time, since at 15 Hz a tap is one to three frames.
 """
 
 import math
@@ -13,14 +13,14 @@ from gestured.core.quantiles import median
 
 Array = NDArray[np.float64]
 
-COMMON = 4.0  # noise units: the most that is taken off for what all taxels share; a palm must not cancel itself
+COMMON = 4.0  # noise units: the most that is subtracted for what all taxels share, since a palm must not cancel itself
 BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
 BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # factor by which a level that all taxels share grows in a spot
 PLACE_SHARE = 0.3  # of the highest taxel: lower taxels say nothing of where the finger is
 PLACE_NOISE = 3.5  # noise units above which a taxel says where the finger is
-TYPICAL = 0.88  # median activity of an idle frame, in units of sqrt(2 ln N), where noise is normal
-USUAL_AT_MOST = 5.0  # the largest `scale`: a sensor that seems more restless than that is touched, or faulty
-SURPRISE = 2.0  # times the typical activity: the most that one idle frame counts, so that none rules the average
+TYPICAL = 0.88  # median activity of an idle frame with normal noise, in units of sqrt(2 ln N)
+USUAL_AT_MOST = 5.0  # the largest `scale`: a sensor that seems more restless is touched, or faulty
+SURPRISE = 2.0  # times the typical activity: the most for which one idle frame counts, so that none rules the average
 
 
 def rarely(taxels: int) -> float:
@@ -48,13 +48,13 @@ class Activity:
         self.usual = self.typical  # median activity as it is, before `scale`
 
     def measure(self, scaled: Array) -> tuple[float, float]:
-        """Strongest spot (a taxel alone, or with its neighbours) and lowest taxel of (N,) deviations in noise units.
+        """The strongest spot (a taxel alone, or with its neighbours) and the lowest taxel of (N,) deviations.
 
-        A finger between taxels gives each of them half of what it gives; weighing the neighbours in (the matched
-        filter of a blob, normalised to the same noise) finds it all the same. What all taxels share is no finger.
+        All are in noise units. A finger between two taxels shows half on each, so the neighbours are weighed in: a
+        matched filter of a blob, normalised to the same noise. What all taxels share is no finger, and is subtracted.
         """
-        # Every frame passes here. At this size one sort is cheaper than a minimum, a middle and a maximum, `dot` than
-        # `@`, `argmax` than `max`, and a comparison than a call.
+        # Every frame passes here. At this size one sort is faster than a minimum, a median and a maximum, `dot` is
+        # faster than `@`, `argmax` than `max`, and a comparison than a call.
         ordered = scaled.copy()
         ordered.sort()
         spots = self._down.dot(scaled.reshape(self.rows, self.columns)).dot(self._across)
@@ -65,7 +65,7 @@ class Activity:
         return spot if spot > alone else alone, ordered.item(0)
 
     def measure_all(self, scaled: Array) -> tuple[Array, Array]:
-        """What `measure` gives of each of (n, N) deviations, of as many sensors: (n,) and (n,)."""
+        """What `measure` gives for each of n sensors, by their (n, N) deviations: (n,) and (n,)."""
         ordered = np.sort(scaled, axis=1)
         spots = np.matmul(np.matmul(self._down, scaled.reshape(-1, self.rows, self.columns)), self._across)
         common = np.minimum(np.maximum(ordered[:, ordered.shape[1] // 2], -COMMON), COMMON)
@@ -73,7 +73,7 @@ class Activity:
         return np.maximum(strongest, ordered[:, -1] - common), ordered[:, 0]
 
     def place(self, pressed: Array, noise: float) -> tuple[float, float]:
-        """Centroid (row, column) of what clearly rises above 0 and above `noise`, of (N,) counts."""
+        """The centroid (row, column), in taxel pitches, of (N,) counts that clearly rise above 0 and above `noise`."""
         top = float(pressed.max())
         share, noise = PLACE_SHARE * top, PLACE_NOISE * noise
         cut = share if noise >= top else max(share, noise)
@@ -87,20 +87,20 @@ class Activity:
         )
 
     def unlearn(self) -> None:
-        """Take the sensor's noise for normal, until `learn` knows better."""
+        """Take the sensor's noise for normal until `learn` is called."""
         self.scale, self.usual = 1.0, 0.0
 
     def learn(self, scaled: Array) -> None:
-        """Learn what is usual from (n, N) deviations of idle frames, in noise units with a `scale` of 1."""
+        """Learn the usual activity from (n, N) deviations of idle frames, in noise units with a `scale` of 1."""
         self.usual = float(median(np.array([self.measure(frame)[0] for frame in scaled])))
 
     def follow(self, t: float, since: float, activity: float) -> None:
-        """Follow a sensor that was idle from `since` to `t` s and has that activity (noise units) at `t`."""
+        """Let the usual activity follow a sensor that was idle from `since` to `t` s, by its `activity` at `t`."""
         seen = min(activity, SURPRISE * self.typical) * self.scale
         self.usual += (seen - self.usual) * -math.expm1((since - t) / NOISE_TAU_S)
 
     def review(self) -> None:
-        """Put what has become usual into `scale`."""
+        """Set `scale` by the usual activity."""
         self.scale = min(max(self.usual / self.typical, 1.0), USUAL_AT_MOST)
 
 

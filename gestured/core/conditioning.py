@@ -1,7 +1,7 @@
-"""From raw counts to counts above the baseline: what is known of one sensor, and one look at a frame.
+"""The conditioner of one sensor: from raw counts to counts above the baseline, and what a frame shows.
 
-Three things are known, each by itself: what the idle sensor shows and how much it moves (`Idle`), how active it usually
-is (`Activity`), and which taxels are bad (`Taxels`).
+What is known of a sensor has three parts: what the idle sensor shows and how much it moves (`Idle`), how active it
+usually is (`Activity`), and which taxels are bad (`Taxels`).
 """
 
 import math
@@ -18,13 +18,13 @@ from gestured.core.taxels import Taxels
 
 Array = NDArray[np.float64]
 
-LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves counts for at most five times a usual one
-BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may come with a firm finger
-DRIFTED = 0.1  # share of the activity of what rested: the bare sensor may have drifted by so much while it was covered
-WIDE_PEAK = 0.5  # of the highest taxel: the taxels above it tell how wide a contact is
-WIDE, WIDE_TAXELS = 0.1, 6  # share of all taxels, and taxels at least, from which on that is no finger, nor two of them
-WIDE_S = 0.5  # s after a wide frame in which a contact counts as wide: an elbow presses about WIDE_TAXELS
-SHIFTED, SHIFTED_OF = 3, 20  # where 3 taxels of 20 lie far below the baseline, no touch did that
+LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves weighs at most five times as much as a usual one
+BELOW_SHARE = 0.3  # of the highest taxel: beside a firm finger, taxels may lie below the baseline by up to that share
+DRIFTED = 0.1  # of the activity of what rested: the bare sensor may have drifted by so much while it was covered
+WIDE_PEAK = 0.5  # of the highest taxel: the taxels above that share tell how wide a contact is
+WIDE, WIDE_TAXELS = 0.1, 6  # a share of all taxels, and a least number of taxels, that not even two fingers press
+WIDE_S = 0.5  # s for which a contact counts as wide after a wide frame: an elbow presses about WIDE_TAXELS
+SHIFTED, SHIFTED_OF = 3, 20  # no touch makes 3 taxels of 20, or more, lie far below the baseline
 
 
 _new = tuple.__new__  # Look(...) takes twice the time
@@ -38,8 +38,8 @@ class Look(NamedTuple):
     above: Array  # (N,) counts above the baseline
     activity: float  # noise units, of the strongest spot
     sunken: bool  # a taxel lies clearly below its baseline, as after a hand that rested there when it was learned
-    burst: bool  # one lies deeper than textile swings after a contact, as after interference
-    shifted: bool  # many lie so deep: no touch does that; the sensor restarted, or a hand has left
+    burst: bool  # a taxel lies deeper than textile swings after a contact, as after interference
+    shifted: bool  # many taxels lie so deep; no touch does that: the sensor restarted, or a hand has left
 
 
 class Conditioner:
@@ -67,10 +67,9 @@ class Conditioner:
         return Look(t, raw, above, activity, True, burst, burst and _shifted(scaled, level))
 
     def unloaded(self, look: Look, after: AfterEffect) -> Look | None:
-        """The frame anew, where what rested on the sensor has left, which the baseline does not know yet.
+        """The look at the same frame after what rested on the sensor has left; None if it has not left.
 
-        The sensor is then known as it was before the rest, and its textile comes back from that. None where the frame
-        does not show the sensor as it was.
+        The baseline is then the one from before anything rested there, and the textile recovers as after a contact.
         """
         idle, bare = self.idle, self.idle.bare
         if bare is None:
@@ -80,7 +79,7 @@ class Conditioner:
         left = (look.raw - counts) * weight
         rested = self.activity.measure((idle.counts - counts) * weight)[0]
         if left.min() < -max(self.deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
-            return None  # it lies there, is about to leave, or another thing has happened
+            return None  # the thing lies there, is about to leave, or something else has happened
         idle.unload(look.raw)
         self.review()
         after.leave(rested, look.t)
@@ -110,10 +109,10 @@ class Conditioner:
         return 0 <= look.t - self._wide_at < WIDE_S
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> bool:
-        """Offer a frame that may be idle; true when the sensor was learned from the second that ends here.
+        """Offer a frame that may be idle; true if the sensor was learned from the second that ends with it.
 
         `rests`: something lies on the sensor that was not there when it was learned. `restless`: that thing is no
-        moving finger, so the sensor is learned with its trembling if no second passes without.
+        moving finger, so if it never lies still for a second, the sensor is learned with its trembling.
         """
         learned = self.idle.settle(t, raw, rests=rests, restless=restless)
         if learned is None:
@@ -126,7 +125,7 @@ class Conditioner:
         return True
 
     def untouched(self, look: Look, *, recovering: bool) -> None:
-        """Nobody touches the sensor: baseline and noise follow. `recovering`: a contact has just ended."""
+        """Let baseline and noise follow a frame without a touch. `recovering`: a contact has just ended."""
         idle, t = self.idle, look.t
         if idle.provisional or look.sunken:
             self.settle(t, look.raw)
@@ -139,7 +138,7 @@ class Conditioner:
         if since is None:
             return
         self.activity.follow(t, since, look.activity)
-        if not look.burst:  # one such reading must not pull the baseline down
+        if not look.burst:  # a burst must not pull the baseline down
             above = np.where(flickering.mask, 0.0, look.above) if flickering.any else look.above
             idle.follow(t, since, above, recovering=recovering)
         if idle.follow_noise(t, look.above):
@@ -152,7 +151,7 @@ class Conditioner:
 
     @property
     def sound(self) -> bool:
-        """Whether the idle sensor is known without doubt, with nothing that rests on it and no bad taxel."""
+        """Whether the idle sensor is known without doubt, nothing rests on it, and no taxel is bad."""
         idle, taxels = self.idle, self.taxels
         doubt = idle.provisional or idle.smallest or idle.bare is not None
         return not (doubt or taxels.count or taxels.frozen.any or taxels.flickering.any)
@@ -171,12 +170,12 @@ class Conditioner:
         self.weight = self._weigh(idle.sigma)
 
     def _weigh(self, sigma: Array) -> Array:
-        """(N,) what a count weighs in noise units, by each taxel's standard deviation; nothing where it is bad."""
+        """(N,) noise units of one count of each taxel, by its standard deviation `sigma` (counts); 0 if it is bad."""
         return np.where(self.taxels.bad, 0.0, weigh(sigma, float(median(sigma)), self.activity.scale))
 
 
 def weigh(sigma: Array, level: float | Array, scale: float | Array) -> Array:
-    """(..., N) what a count weighs in noise units, by each taxel's standard deviation and the sensor's."""
+    """(..., N) noise units of one count of each taxel, by its standard deviation and the sensor's `level` (counts)."""
     return np.asarray(1.0 / (scale * np.maximum(sigma, LEAST_SIGMA * level)))
 
 

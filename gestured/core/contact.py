@@ -1,13 +1,13 @@
-"""What is known of a contact: when it was, where its centroid went, and what it leaves behind."""
+"""A contact: when it was, where its centroid went, and what it leaves behind."""
 
 import math
 
 Centroid = tuple[float, float]  # (row, column) in taxel pitches
 
 RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
-ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, and a new contact must exceed it
-RECOVERY_S = 1.0  # s, with which the after-effect fades; for so long after a contact the baseline follows faster
-AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
+ON_SHARE = 0.20  # of a contact's peak: its frames above this share are strong, and a new contact must exceed it
+RECOVERY_S = 1.0  # time constant of the after-effect, during which the baseline also follows faster
+AFTER_S = 8.0  # after so long nothing is left of a contact: even a firm finger's after-effect is below the noise
 SPIKE = 4.0  # times the second highest frame: a peak in a single frame counts as at most this
 FIRM = 8.0  # times `on`: a contact's second highest frame counts as at least this, since a tap may have a single frame
 
@@ -46,7 +46,7 @@ class AfterEffect:
         """Begin anew, as if there had been no contact."""
         self.peak = 0.0  # noise units, the highest activity of the contact that goes on, or of the last one
         self._next = 0.0  # noise units, the activity of that contact's second highest frame
-        self._over = -math.inf  # s, the first frame after that contact; infinite while it goes on
+        self._over = -math.inf  # s, the first frame after that contact; infinite while the contact goes on
 
     def begin(self) -> None:
         """A contact has begun."""
@@ -54,30 +54,30 @@ class AfterEffect:
         self._over = math.inf
 
     def touch(self, activity: float) -> None:
-        """A frame of the contact, as active as that in noise units."""
+        """Take a frame of the contact, with its activity in noise units."""
         self._next = max(self._next, min(self.peak, activity))
         self.peak = max(self.peak, activity)
 
     def fade(self, t: float) -> None:
-        """A frame at `t` s belongs to no contact: from the first such one on, what the last one left behind fades."""
+        """A frame at `t` s belongs to no contact. From the first such frame on, the after-effect fades."""
         if self._over == math.inf:
             self._over = t
 
     def leave(self, activity: float, t: float) -> None:
-        """What had rested on the sensor, as active as that in noise units, is gone at `t` s."""
+        """What had rested on the sensor, with that activity in noise units, has left at `t` s."""
         self.begin()
         self.peak = self._next = activity
         self._over = t
 
     def recovering(self, t: float) -> bool:
-        """Whether a contact has ended just before `t` s, so that what is left on the sensor is its after-effect."""
+        """Whether a contact has ended so shortly before `t` s that the sensor shows its after-effect."""
         return t - self._over < RECOVERY_S
 
     def level(self, t: float) -> float:
-        """Activity that a contact may leave behind at `t` s, in noise units.
+        """The activity in noise units that a contact may have left behind at `t` s.
 
-        One frame that is beyond all others is a fault of the readout, and leaves nothing behind; but the rest of the
-        contact in which it came is no new one.
+        A single frame far above all others is a fault of the readout and leaves nothing behind. Its full peak counts
+        for RECOVERY_S all the same, so that the rest of its contact is not taken for a new one.
         """
         past = max(t - self._over, 0.0)
         if past > AFTER_S:

@@ -1,8 +1,8 @@
-"""The latest frames of one sensor, the segments that are cut out of them, and what a hole in one may hide.
+"""The cutter: it keeps the latest frames of one sensor, cuts segments out of them, and finds holes in them.
 
-A hole is a time in which nobody saw the finger. It may hide a turn, a lift, a second tap or a circle. It hides none of
-them where the finger goes on behind it as it came: straight on, or along the same bend, hardly slower than before; or
-where it had moved and rests on both sides.
+A hole is a time in which nobody saw the finger. It may hide a turn, a lift, a second tap or a circle. It hides nothing
+if the finger goes on after the hole as before it (straight on or along the same bend, and hardly slower), or if the
+finger had moved and rests on both sides of the hole.
 """
 
 import math
@@ -19,16 +19,16 @@ from gestured.core.frames import QUIET_S, UNDISTURBED, Before, Segment
 from gestured.core.taxels import Still
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; the largest that a frame on the wire can hold
-LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
-LEAD_FRAMES = 200  # quiet frames kept at most: LEAD_S at 1000 Hz and more; a sensor's own clock may all but stand still
+LEAD_S = 0.15  # quiet frames are kept for so long before an onset, at 15 Hz two of them
+LEAD_FRAMES = 200  # the most quiet frames kept: more than LEAD_S at 1000 Hz, since a sensor's clock may stand still
 HOLE_S = 0.25  # after longer without a frame nobody knows what the finger did meanwhile
-HOLE_FRAMES = 2.5  # intervals of the sensor: a slow sensor's hole may last so many, whatever the seconds
+HOLE_FRAMES = 2.5  # a slow sensor's hole may last so many of its intervals, even if that is more than HOLE_S
 CLEAR_S = 0.45  # the longest hole that a clear path excuses: five frames lost in a row at 15 Hz
-MOST_BEFORE = 64  # contacts that are remembered: more in ten seconds say nothing new
-SIDE = 3  # frames at most on each side of a hole from which its way is taken
-STRAIGHT = math.radians(40.0)  # angle up to which the way across the hole goes straight on from the way beside it
-BENT = math.radians(75.0)  # angle up to which that holds where both ways bend to the same side, as on a circle
-SLOWEST = 0.75  # times the speed beside the hole: a finger slower than that has turned a corner, or stopped
+MOST_BEFORE = 64  # the most contacts that are remembered, since more in ten seconds say nothing new
+SIDE = 3  # the most frames on each side of a hole by which the finger's way there is told
+STRAIGHT = math.radians(40.0)  # the largest angle between the ways across and beside a hole that is still straight on
+BENT = math.radians(75.0)  # the largest such angle if the finger bends to one side throughout, as on a circle
+SLOWEST = 0.75  # times the speed beside the hole: a slower finger has turned a corner, or stopped
 
 
 Sight = tuple[float, Centroid]  # s, and where the finger was seen then
@@ -40,9 +40,9 @@ class Kept(NamedTuple):
 
     t: float  # s
     above: NDArray[np.float64]  # (N,) counts above the baseline
-    lost: int  # frames, just before this one
-    place: Centroid | None  # centroid, where the frame is touched
-    new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
+    lost: int  # frames that went missing just before this one
+    place: Centroid | None  # None for a quiet frame
+    new: float  # s, when the sensor first sent these counts, since a repeated frame tells nothing
 
 
 class Cutter:
@@ -53,15 +53,15 @@ class Cutter:
         self._conditioner = conditioner
         self._travel = travel
         self.kept: deque[Kept] = deque()
-        # The segment that was made last, and its taxels: the classifier is given the same object when it is cut.
+        # The segment that was made last, and its unmoved taxels; `cut` gives the same object that `draft` has given.
         self._made: tuple[Segment, Still] | None = None
         self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
-        self._began: deque[float] = deque(maxlen=MOST_BEFORE)  # s, of the contacts of the last ten seconds
-        self._ended = -math.inf  # s, the last contact's end
+        self._began: deque[float] = deque(maxlen=MOST_BEFORE)  # s, the onsets of the contacts in the last QUIET_S
+        self._ended = -math.inf  # s, the end of the last contact
         self._length_s = 0.0  # of the last contact
         self.settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
         self.last_raw = b""  # raw counts of the last frame
-        self.new = 0.0  # s, since when the frames show just these counts
+        self.new = 0.0  # s, when the sensor first sent these counts
 
     def silent(self) -> None:
         """The stream paused: what follows was not seen to begin."""
@@ -69,7 +69,7 @@ class Cutter:
         self.settled = -math.inf
 
     def keep(self, look: Look, lost: int, place: Centroid | None) -> None:
-        """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
+        """Keep a frame. One that repeats the last tells nothing new, unless the idle sensor repeats frames, too."""
         t, shown = look.t, look.raw.tobytes()
         if shown != self.last_raw or not self._conditioner.idle.lively:
             self.new = t
@@ -77,13 +77,13 @@ class Cutter:
         self.kept.append(_new(Kept, (t, look.above, lost, place, self.new)))
 
     def trim(self, t: float) -> None:
-        """Nothing is open at `t` s: keep what the next contact may need before its onset."""
+        """Forget the frames that the next contact will not need, since nothing is open at `t` s."""
         kept = self.kept
         while kept[0].t < t - LEAD_S or len(kept) > LEAD_FRAMES:
             kept.popleft()
 
     def begin(self, t: float, covered: float, rest: float) -> None:
-        """A contact begins at `t` s on a sensor on which something rests, as `Before` has it."""
+        """A contact begins at `t` s. `covered` and `rest` say what rests on the sensor, as in `Before`."""
         began = self._began
         while began and t - began[0] > QUIET_S:
             began.popleft()
@@ -99,7 +99,7 @@ class Cutter:
             self._length_s = max(t - self._began[-1], 0.0)
 
     def draft(self, onset: float, offset: float) -> Segment | None:
-        """The segment of a contact that may be over; None where it has been asked for already."""
+        """The segment of a contact that may be over; None if it was given already."""
         before = self._made
         made = self._make(onset, offset)
         return None if made is before else made[0]
@@ -113,9 +113,9 @@ class Cutter:
         return segment
 
     def hole(self, onset: float, offset: float, until: float) -> float:
-        """The longest time in s in which a finger may have done anything unseen, from before the onset to `until` s.
+        """The longest time in s in which the finger may have moved unseen, from before the onset to `until` s.
 
-        It is infinite where the finger's arrival was not seen. What comes after `until` does not count.
+        It is infinite if the finger's arrival was not seen.
         """
         last, longest = self.settled, 0.0
         for new in (*(kept.new for kept in self.kept), until):
@@ -128,13 +128,13 @@ class Cutter:
     def _clear(self, onset: float, begin: float, end: float, offset: float) -> bool:
         """Whether nothing hides in the hole from `begin` to `end` s of a contact."""
         if any(begin < kept.t < end for kept in self.kept):
-            return False  # the sensor repeated a frame, so the segment shows a finger at rest that may have moved
+            return False  # the sensor repeated a frame: the segment shows a finger at rest, which may have moved
         seen = [(k.t, k.place) for k in self.kept if k.place is not None and onset <= k.t <= offset]
         before, after = [one for one in seen if one[0] <= begin], [one for one in seen if one[0] >= end]
         return clear(before, after, self._travel)
 
     def _make(self, onset: float, offset: float) -> tuple[Segment, Still]:
-        """The segment of a contact: made once, unless a taxel has turned out to be bad since."""
+        """The segment of a contact, made only once unless a taxel has turned out to be bad since."""
         made, taxels = self._made, self._conditioner.taxels
         if made is not None and (made[0].onset, made[0].offset) == (onset, offset):
             if made[0].bad is not None and np.array_equal(made[0].bad.reshape(-1), taxels.bad):
@@ -147,7 +147,7 @@ class Cutter:
     def segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
         """The segment of all that is kept, and (T, N) counts above the baseline before bad taxels are bridged.
 
-        A later `draft` or `cut` does not see it.
+        It does not count as the segment that was made last.
         """
         kept, conditioner = list(self.kept), self._conditioner
         times = np.array([frame.t for frame in kept])
@@ -162,7 +162,7 @@ class Cutter:
 
 
 def bearable_s(interval_s: float) -> float:
-    """Seconds that a hole may last before it counts against a contact, where frames are `interval_s` apart."""
+    """Seconds that a hole may last before it counts against a contact whose frames are `interval_s` apart."""
     return max(HOLE_S, HOLE_FRAMES * interval_s)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SMALLEST = 1e-30  # counts; the least noise that anything is divided by
-QUIET_S = 10.0  # a contact further ago says nothing of the next one
+QUIET_S = 10.0  # s; a contact that is longer ago says nothing of the next one
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,23 +30,23 @@ class Frame:
 
 
 class Before(NamedTuple):
-    """What went on at a sensor before a contact began."""
+    """The past of a sensor when a contact began."""
 
-    quiet_s: float = QUIET_S  # since the last contact, at most `QUIET_S`
+    quiet_s: float = QUIET_S  # time since the last contact, at most `QUIET_S`
     recent: int = 0  # contacts that began in the last `QUIET_S`
-    length_s: float = 0.0  # of the last contact, if one was so recent
+    length_s: float = 0.0  # length of the last contact, if it was so recent
     covered: float = 0.0  # share of the taxels on which something rests that has become part of the baseline
-    rest: float = 0.0  # how hard, in noise units
+    rest: float = 0.0  # noise units, the activity of what rests there
 
 
-UNDISTURBED = Before()  # how cut gestures and the start of a stream are judged
+UNDISTURBED = Before()  # of a segment whose past is not known, as in a file of cut gestures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
     """The frames of one gesture: conditioned, at the sensor's own grid and rate.
 
-    The frames before `first` and after `last` are quiet context, which a model's window may take in.
+    The frames before `first` and after `last` are quiet ones, which a model's window may take in.
     """
 
     frames: NDArray[np.float32]  # (T, R, C) counts above the baseline
@@ -56,7 +56,7 @@ class Segment:
     noise: float  # counts, one standard deviation of an idle taxel
     lost: int = 0  # frames that went missing between `first` and `last`
     before: Before = UNDISTURBED
-    bad: NDArray[np.bool_] | None = None  # (R, C) taxels that are bridged from their neighbours; None is none
+    bad: NDArray[np.bool_] | None = None  # (R, C) taxels that are bridged from their neighbours; None if none are
 
     @property
     def onset(self) -> float:

@@ -1,8 +1,8 @@
-"""One sensor's way from frame to segment: frames in, what was found in them out.
+"""The front end of one sensor: from its frames to the contacts and segments that were found in them.
 
-A front end knows neither its sensor's name nor who asks. Of each contact it gives `Opened`, then one of `Cut` and
-`Void`, and at last `Ended`; and a `Segment` where the finger may have left:
-that is what will be cut if it stays off, so that its name may be looked for meanwhile.
+A front end knows neither its sensor's name nor who asks. For each contact it gives `Opened`, then one of `Cut` and
+`Void`, and at last `Ended`. When the finger may have left, it also gives the `Segment` that will be cut if the finger
+stays off, so that a classifier can be asked meanwhile.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from gestured.core.settling import PATIENCE_S
 from gestured.core.taxels import RUBBISH_S
 from gestured.core.timing import Pace, Timing
 
-DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
+DRAFT_S = 0.085  # s of quiet after which all that a window takes in is there; the wait itself ends later
 
 
 class Opened(NamedTuple):
@@ -33,9 +33,9 @@ class Opened(NamedTuple):
 class Cut(NamedTuple):
     """A segment that is complete and waits for its name."""
 
-    segment: Segment  # the object that was given before it, unless a taxel has turned out to be bad since
+    segment: Segment  # the same object as the last `Segment`, unless a taxel has turned out to be bad since
     decided: float  # s, when it was complete
-    hole_s: float  # the longest time until then in which the finger may have done anything unseen
+    hole_s: float  # the longest time until then in which the finger may have moved unseen
 
 
 class Void(NamedTuple):
@@ -45,7 +45,7 @@ class Void(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """The sensor was let go."""
+    """A contact is over: the sensor was let go."""
 
     offset: float  # s
 
@@ -115,10 +115,10 @@ class FrontEnd:
         return 1.0 / self.pace.interval_s if self.pace.interval_s > 0 else 0.0
 
     def push(self, frame: Frame) -> list[Found]:
-        """Take one frame, give all that was found, in order.
+        """Take one frame; return all that was found, in order.
 
-        Its time must lie after the last one's (ValueError), its grid must be the sensor's, its values finite and within
-        float32.
+        Its time must lie after the last one's (ValueError). Its grid must be the sensor's, and its values finite and
+        within float32, which is not checked.
         """
         t = frame.t
         values = frame.values if self.as_sent else self.mounting.frame(frame.values)
@@ -178,9 +178,9 @@ class FrontEnd:
 
     @property
     def due(self) -> float | None:
-        """When `wait` will find something unless a frame comes before, in s. None where there is nothing to wait for.
+        """When `wait` will find something unless a frame comes before, in s; None if there is nothing to wait for.
 
-        Where a frame is overdue before that moment, nothing is decided without it: it may show the finger again.
+        If a frame is overdue before that time, nothing is decided without it, since it may show the finger again.
         """
         over = self.segmenter.over
         return over if over is not None and over <= self.pace.sure else None
@@ -196,12 +196,12 @@ class FrontEnd:
         return self.pace.longest_s(self.segmenter.onset, self.segmenter.last_touched) < self.timing.glitch_s
 
     def so_far(self) -> Segment | None:
-        """All that has come of the contact that goes on; None where nothing is left of it without its bad taxels."""
+        """The segment of the open contact as far as it has come; None if nothing is left without the bad taxels."""
         segment, _ = self.cutter.segment(self.segmenter.onset, self.segmenter.last_touched)
         return segment if segment.frames.max() >= self.segmenter.off * segment.noise else None
 
     def give_up(self, t: float) -> list[Found]:
-        """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
+        """Cancel the open contact as held: it has too many frames, or is too long by another clock than theirs."""
         return self._done(self.segmenter.give_up(t), t)
 
     def flush(self, t: float) -> list[Found]:
@@ -209,7 +209,7 @@ class FrontEnd:
         found = self.wait(t)
         segmenter, last = self.segmenter, self.pace.last
         if segmenter.phase.touched and last is not None:
-            t = min(t, last + self.timing.stale_s)  # it was over then, whenever one asks
+            t = min(t, last + self.timing.stale_s)  # the silence ended the contact then, however late this call is
             found += self._done(segmenter.wait(t, self.pace.sure), last)
             if segmenter.phase.let_go:
                 found += self._close(segmenter.onset, segmenter.last_touched, t, last)
@@ -237,7 +237,7 @@ class FrontEnd:
         return found
 
     def _pass(self, t: float) -> list[Found]:
-        """Time passes until a frame at `t` s: what that alone decides. A frame cannot join what is over."""
+        """What the time before a frame at `t` s decides alone, since a frame cannot join a contact that is over."""
         found: list[Found] = []
         segmenter, step = self.segmenter, self.pace.step(t)
         if step > self.timing.stale_s:
@@ -256,14 +256,14 @@ class FrontEnd:
         if self._below_since is None:
             self._below_since, self._lowest = look.t, look.raw
         self._lowest = np.minimum(self._lowest, look.raw)
-        leaving = self.conditioner.idle.bare is not None  # then `unloaded` will know the sensor when it has left
+        leaving = self.conditioner.idle.bare is not None  # what rests may be leaving, and `unloaded` will see it gone
         if look.t - self._below_since >= (self.timing.stale_s if leaving else self.timing.shift_s):
             found = self.reset(keep=True, shown=self._lowest)
         self.conditioner.settle(look.t, look.raw)
         return found
 
     def _left(self) -> list[Found]:
-        """What rested on the sensor and was learned has left; a contact that was open was its own, and is held."""
+        """What rested on the sensor has left: an open contact was made by that thing, and is cancelled as held."""
         found = self._cancel("held") if self.touched else []
         self.segmenter.phase = IDLE
         self.cutter.kept.clear()
@@ -271,14 +271,14 @@ class FrontEnd:
         return found
 
     def _void(self, reason: str) -> list[Found]:
-        """The idle sensor is another one from here on: a contact that goes on is over, and nothing is left of it."""
+        """Cancel the open contact, if any, and forget its frames: the baseline is another one from here on."""
         found = self._cancel(reason) if self.touched else []
         self.segmenter.reset()
         self.cutter.kept.clear()
         return found
 
     def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
-        """What was found by the segmenter's deeds; the sensor was seen until `seen` (s)."""
+        """What the segmenter's deeds mean for the front end; the sensor was seen until `seen` (s)."""
         found: list[Found] = []
         for action, onset, offset, decided in deeds:
             if action is Action.OPEN:
@@ -306,11 +306,11 @@ class FrontEnd:
         self.conditioner.taxels.flickering.begin(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
-        """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
+        """Cut the segment that was decided at `t` s, unless it was no finger's."""
         if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Void("glitch"), self._end(offset)]
         segment = self.cutter.cut(onset, offset)
-        nothing = float(segment.frames.max()) < self.segmenter.off * segment.noise  # is left without its bad taxels
+        nothing = float(segment.frames.max()) < self.segmenter.off * segment.noise  # without its bad taxels
         if self._forget_rubbish() or nothing:
             return [Void("stuck"), self._end(offset)]
         return [Cut(segment, t, self.cutter.hole(onset, offset, seen)), self._end(offset)]
@@ -320,12 +320,12 @@ class FrontEnd:
         return Ended(offset)
 
     def _forget_rubbish(self) -> bool:
-        """Whether the contact that is over was rubbish, which leaves no after-effect behind."""
+        """Whether the last contact was rubbish; if so, its after-effect is cleared, since rubbish leaves none."""
         if self.conditioner.taxels.flickering.rubbish:
             self.segmenter.after.clear()
         return self.conditioner.taxels.flickering.rubbish
 
     def _cancel(self, reason: str) -> list[Found]:
-        """The contact that goes on has no answer, and ends."""
+        """End the open contact without an answer."""
         ended = self._end(self.segmenter.last_touched)
-        return [Void(reason), ended] if self.segmenter.phase.pending else [ended]  # else it was given up already
+        return [Void(reason), ended] if self.segmenter.phase.pending else [ended]  # else it has its `Void`

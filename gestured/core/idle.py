@@ -1,6 +1,6 @@
-"""What the idle sensor shows, how much it moves, and in which step it counts.
+"""The idle sensor: its baseline, its noise and its quantisation step.
 
-That is learned from a second in which nothing moved, then followed while the sensor is idle.
+All three are learned from a second in which nothing moved, then followed while the sensor is idle.
 """
 
 import math
@@ -13,23 +13,24 @@ from gestured.core.settling import LEAST_STEP, RESOLUTION, SIGMA_PER_DEVIATION, 
 
 Array = NDArray[np.float64]
 
-BASELINE_TAU_S = 2.0  # time constant of the idle sensor: drift of hours and warmth of minutes are followed
-RECOVERY_TAU_S = 0.4  # time constant just after a contact: textile comes back slowly, and that is no touch
-NOISE_TAU_S = 30.0  # the time constant with which noise is followed: it changes slowly
-REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too much at each frame
-UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
-OUTLIER = 4.0  # times a taxel's noise: the furthest that it counts as off its baseline, since one outlier must not rule
-QUIETER = 10.0  # where frames move so many times less than the noise that was learned, that was no idle sensor's
-SHARED = 0.1  # the quantile of the taxels' change that is taken for drift of them all
-LOADED = 10.0  # times a taxel's noise: where no taxel is further above the bare sensor, nothing rests on it any more
+BASELINE_TAU_S = 2.0  # time constant of the baseline: it follows drift over hours and warmth over minutes
+RECOVERY_TAU_S = 0.4  # time constant of the baseline just after a contact, since textile comes back slowly
+NOISE_TAU_S = 30.0  # time constant of the noise, which changes slowly
+REVIEW_S = 0.5  # the pause between two steps of the noise, which would cost too much with each frame
+UNSEEN_S = 4.0  # the longest step of the noise: one frame says little of a long contact or silence before it
+OUTLIER = 4.0  # times a taxel's noise: a frame counts as at most so far off the baseline, since no outlier must rule
+QUIETER = 10.0  # if frames move so many times less than the noise that was learned, no idle sensor was learned
+SHARED = 0.1  # the quantile of the taxels' changes that is taken for a drift of all taxels
+LOADED = 10.0  # times a taxel's noise: if no taxel is further above the bare sensor, nothing rests on it any more
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
-GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # of a quieter frame, of a repeated one; the sum that puts it in doubt
+# Weights of a glance at a frame that moves QUIETER times less and at a repeated one; the sum that proves a mistake.
+GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9
 
 
 class Idle:
     """What one sensor shows while nobody touches it, and how much it moves.
 
-    All of it stands still under a contact: a tracker that went on would erase the hand.
+    Nothing of this changes under a contact, since a baseline that went on following would erase the hand.
     """
 
     def __init__(self, taxels: int) -> None:
@@ -39,29 +40,29 @@ class Idle:
         self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self.lively = False  # whether no frame of the idle sensor repeated the one before it
         self.known = False  # whether an idle second was learned
-        self.provisional = False  # whether what was learned is in doubt, and the next stable second replaces it
+        self.provisional = False  # whether what was learned is in doubt, so that the next stable second replaces it
         self.glance = math.inf  # s, when `mistaken` is to be asked next
-        self.smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
-        # `counts` and `sigma` before something was laid on the sensor that has since become part of the baseline.
+        self.smallest = 0.0  # counts, the smallest change so far of a sensor that stood still when learned; else 0
+        # `counts` and `sigma` of the bare sensor, if something rests on it that has become part of the baseline.
         self.bare: tuple[Array, Array] | None = None
         self.settling = Settling()  # the frames that `settle` was offered
         self.followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self.reviewed = 0.0  # s, when the noise was last looked at
         self.learned = 1.0  # counts, `level` as it was learned
-        self.quieter = 0  # sum of the weights of the last glances that were quieter
-        self.compared: Array = np.zeros(taxels)  # (N,) raw counts that those of the next glance are compared with
+        self.quieter = 0  # the sum of the weights of the glances since the last frame that moved as was learned
+        self.compared: Array = np.zeros(taxels)  # (N,) raw counts with which the next glance compares its own
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
-        """Offer (N,) counts that may be idle; what was learned, if a stable second ends here.
+        """Offer (N,) counts at `t` s that may be idle; returns what was learned, if a stable second ends with them.
 
-        `rests`: something lies there that was not when it was learned; `restless`: it may never lie still.
+        `rests`: something lies there that was not there when the sensor was learned. `restless`: it may tremble.
         """
         learned = self.settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:
             bare = (self.counts, self.sigma) if rests and self.bare is None else self.bare
             if bare is not None:
                 counts, sigma = bare
-                if not self.known:  # the bare sensor was seen for a moment: what all taxels share is drift
+                if not self.known:  # the bare counts are those of a moment, and what all taxels share since is drift
                     counts = counts + max(quantile(learned.baseline - counts, SHARED), 0.0)
                 lies = (learned.baseline - counts > LOADED * sigma).any()
                 bare = (counts, sigma) if lies else None
@@ -72,19 +73,20 @@ class Idle:
             self.smallest, self.compared = math.inf if learned.still else 0.0, raw
             self._set(learned.noise)
             self.quieter, self.learned = 0, self.level
-            self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf  # what moves, moves by a step
+            # A frame that moves at all moves by a step, so with less noise no frame can be QUIETER times less.
+            self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf
         return learned
 
     @property
     def doubtful(self) -> bool:
-        """Whether the noise was learned from what was no idle sensor, as frames since then show."""
+        """Whether frames have shown that the noise was not learned from an idle sensor."""
         return self.quieter >= GLANCES
 
     def mistaken(self, t: float, raw: Array) -> bool:
-        """Whether (N,) counts at `t` s and those before them show that no idle sensor was learned; then it is in doubt.
+        """Glance at (N,) counts at `t` s; whether no idle sensor was learned, in which case it is put in doubt.
 
-        A finger moves few taxels, so it may be there meanwhile. A repeated frame says less than another one, since the
-        sensor may have frozen, and nothing where the idle sensor repeats itself.
+        A finger may be there, since it moves few taxels. A repeated frame says less than another quiet one, since the
+        sensor may have frozen; of a sensor that repeats frames when it is idle, it says nothing.
         """
         if self.provisional:
             return False
@@ -100,9 +102,9 @@ class Idle:
         return self.doubtful
 
     def learns_step(self, raw: Array) -> bool:
-        """Learn the quantisation step, and with it the noise, from (N,) counts of a sensor that stood still so far.
+        """Learn step and noise from (N,) counts of a sensor that stood still when it was learned.
 
-        Asked where there is a `smallest` change. True if these counts change by less than that.
+        Called if `smallest` is not 0. True if these counts have changed by less than that.
         """
         moved = raw != self.compared
         changed = raw[moved] - self.compared[moved]
@@ -117,26 +119,26 @@ class Idle:
         return True
 
     def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
-        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` its baseline."""
+        """Let the baseline follow a sensor that was idle from `since` to `t` s and is (N,) counts `above` it at `t`."""
         tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
         self.counts = self.counts + above * -math.expm1((since - t) / tau)
 
     def follow_noise(self, t: float, above: Array) -> bool:
-        """Follow how much the sensor moves, idle and (N,) counts off its baseline at `t` s; whether it was time to."""
+        """Let the noise follow an idle sensor, (N,) counts `above` its baseline; false until REVIEW_S is over."""
         if t - self.reviewed < REVIEW_S:
             return False
         since = max(self.reviewed, t - UNSEEN_S)
         sigma = self.sigma + (seen(above, self.sigma) - self.sigma) * -math.expm1((since - t) / NOISE_TAU_S)
-        self._set(np.maximum(sigma, self.step / 2))  # what shows no noise may have some all the same
+        self._set(np.maximum(sigma, self.step / 2))  # noise of less than half a step does not show
         self.reviewed = t
         return True
 
     def doubt(self) -> None:
-        """Put what was learned in doubt: it holds until the next stable second replaces it."""
+        """Put what was learned in doubt; it is used until the next stable second replaces it."""
         self.provisional, self.followed = True, None
 
     def unload(self, raw: Array) -> None:
-        """What rested has left, as (N,) counts show: the sensor is as it was before, until the next stable second."""
+        """Go back to the bare sensor until the next stable second: what rested has left, as (N,) `raw` counts show."""
         assert self.bare is not None
         (counts, sigma), self.bare = self.bare, None
         self.counts = np.minimum(counts, raw)
@@ -145,9 +147,9 @@ class Idle:
         self.doubt()
 
     def forget(self, *, keep: bool, shown: Array | None = None) -> None:
-        """Learn the next stable second. `keep`: the frames that `settle` was offered count for it.
+        """Forget the idle sensor until the next stable second. `keep`: frames that `settle` was offered count for it.
 
-        `shown` (N,) counts: what the sensor shows meanwhile, if a hand may come before it is learned.
+        `shown`: (N,) counts of the bare sensor, in case a hand comes to rest before it is learned.
         """
         self.known = self.provisional = False
         self.bare = None if shown is None else (shown, self.sigma if self.bare is None else self.bare[1])
@@ -161,9 +163,9 @@ class Idle:
 
 
 def glances(changes: Array, learned: Array, lively: Array, quieter: Array) -> Array:
-    """What a glance adds to `quieter` of each of n sensors (n,), whose (N,) counts have changed so much since the last.
+    """(n,) what a glance adds to `quieter` of each of n sensors, whose (n, N) counts have changed by `changes`.
 
-    It is what `Idle.mistaken` finds of one.
+    `Idle.mistaken` does the same for one sensor.
     """
     jumps = np.sort(np.abs(changes), axis=1)
     moved = np.count_nonzero(jumps, axis=1)  # the taxels that did not move are sorted before them
@@ -174,5 +176,5 @@ def glances(changes: Array, learned: Array, lively: Array, quieter: Array) -> Ar
 
 
 def seen(above: Array, sigma: Array) -> Array:
-    """(..., N) counts, the noise of each taxel as one frame shows it; `sigma`: the noise so far."""
+    """(..., N) counts, the noise of each taxel by one frame `above` the baseline; `sigma`: the noise so far."""
     return np.minimum(np.abs(above), OUTLIER * sigma) * SIGMA_PER_DEVIATION

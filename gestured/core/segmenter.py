@@ -1,4 +1,4 @@
-"""The pressure-activity state machine: which frames belong to one gesture.
+"""The segmenter: a state machine of activity that finds which frames belong to one gesture.
 
 Activity is the strongest spot of a frame in units of noise. The cases, and what becomes of them:
 
@@ -15,9 +15,9 @@ Activity is the strongest spot of a frame in units of noise. The cases, and what
 
 Not handled: two people on one sensor, and a tap that begins while another finger still rests (one contact).
 
-`TRANSITIONS` is its table. A row stands for a phase (what is true of the sensor) and a signal (what a frame or the time
-says): the phase that follows, what the front end does, and what is remembered. ARCHITECTURE.md shows the same table; a
-test compares them.
+`TRANSITIONS` is its table. For a phase (what is true of the sensor) and a signal (what a frame or the time says), a row
+names the phase that follows, what the front end does, and what is remembered. ARCHITECTURE.md shows the same table, and
+a test compares them.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,12 @@ from gestured.core.activity import hardly_ever, rarely
 from gestured.core.contact import ON_SHARE, AfterEffect, Centroid, Stretch
 from gestured.core.timing import Timing
 
-FAINT = 4.0  # times `on`: up to that activity something may lie on the sensor and be no gesture: the edge of an arm
-RISE = 2.5  # times the activity of what lies there: a contact that becomes so active is a finger beside it
-SWAY = 1.25  # times the activity of what lies there: it may grow so far, and still the finger counts as off
+FAINT = 4.0  # times `on`: something less active, such as the edge of an arm, may lie on the sensor during a gesture
+RISE = 2.5  # times the activity of something faint: a contact that becomes so active is a finger beside it
+SWAY = 1.25  # times the activity of something faint: it may grow so far, and the finger still counts as off
 TREMBLES = 0.5  # of the way that a tap may move: a contact that was given up and moves further is a finger, not a thing
-SPAN_S = 0.15  # the length of a span; of three spans it is remembered how strongly the contact was pressed
-OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
+SPAN_S = 0.15  # the length of a span; the highest activity is remembered of each of the last three spans
+OFF_SHARE = 0.12  # of the contact's peak: below this share the finger is off, since textile recovers slowly
 
 
 class Signal(IntEnum):
@@ -58,7 +58,7 @@ class Action(IntEnum):
     RISE = auto()  # the contact begins anew: what was touched before belongs to something that lies there
     CLOSE = auto()  # the segment is over
     SPLIT = auto()  # the first contact is a segment, the second one begins another
-    HELD = auto()  # give the contact up: no segment is made of it
+    HELD = auto()  # the contact is given up: no segment is made of it
     LEFT = auto()  # a given-up contact was let go
 
 
@@ -66,14 +66,14 @@ class Action(IntEnum):
 
 
 def _untouched(segmenter: "Segmenter", t: float) -> tuple[float, float]:
-    """Levels while nobody touches: a new contact has to exceed what the last one has left behind."""
+    """Levels while nobody touches the sensor: a contact has to exceed what the last one has left behind."""
     return segmenter.on + segmenter.after.level(t), segmenter.off
 
 
 def _touched(segmenter: "Segmenter", t: float) -> tuple[float, float]:
-    """A finger is off below a share of its own peak, and back above a larger one: hysteresis.
+    """Levels of a contact: a finger is off below a share of its own peak, and back above a larger share (hysteresis).
 
-    Where something faint lies there as well, the shares are of what the finger adds to its activity.
+    If something faint lies there as well, the shares are of what the finger adds to that thing's activity.
     """
     under = segmenter.under
     risen = segmenter.after.peak - under
@@ -82,7 +82,7 @@ def _touched(segmenter: "Segmenter", t: float) -> tuple[float, float]:
 
 
 def _given_up(segmenter: "Segmenter", t: float) -> tuple[float, float]:
-    """Levels of a contact that was given up: whatever reaches `off` counts as touched, so that nothing is weak."""
+    """Levels of a contact that was given up: all that reaches `off` counts as touched, so no frame is weak."""
     return segmenter.off, segmenter.off
 
 
@@ -129,7 +129,7 @@ def _touch(segmenter: "Segmenter", t: float, activity: float) -> Signal | None:
     rose, lay = None, segmenter.lately(t, activity)
     if segmenter.first is None:
         if segmenter.after.peak < OFF_SHARE * activity:
-            segmenter.rise(t)  # what came before was too faint to belong to it: a hover, or noise
+            segmenter.rise(t)  # what came before was too faint to belong to the contact: a hover, or noise
         elif 0 < lay <= FAINT * segmenter.on and activity >= RISE * lay:
             rose = Signal.ROSE
             segmenter.after.begin()
@@ -145,7 +145,7 @@ def _moved(segmenter: "Segmenter") -> Signal | None:
 
 
 def _quiet(segmenter: "Segmenter", t: float, activity: float, place: Centroid | None) -> None:
-    """The first quiet frame is the one from which the waits count."""
+    """Remember the first quiet frame, from which the waits count."""
     if segmenter.quiet_since is None:
         segmenter.quiet_since = t
 
@@ -173,12 +173,12 @@ class Phase:
     """What is true of the sensor, and how frames and waits are read while it is."""
 
     name: str
-    levels: Callable[["Segmenter", float], tuple[float, float]]  # strong from the first on, quiet below the other
+    levels: Callable[["Segmenter", float], tuple[float, float]]  # strong from the first on, quiet below the second
     wait: str = ""  # the name in `Timing` of the seconds of quiet after which time alone decides
     says: Callable[["Segmenter"], Signal] | None = None  # what the end of that wait says
-    touched: bool = True  # a contact goes on, given up or not
-    pending: bool = True  # the contact goes on and may still become a segment
-    let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
+    touched: bool = True  # whether a contact goes on, given up or not
+    pending: bool = True  # whether a contact goes on that may still become a segment
+    let_go: bool = False  # whether the finger is off, so that the contact can be decided if the stream ends
 
     def reads(self, segmenter: "Segmenter", t: float, activity: float) -> Signal:
         """What a frame at `t` s says by its activity, in noise units."""
@@ -225,11 +225,11 @@ TRANSITIONS: dict[tuple[Phase, Signal], Row] = {
 
 
 class Deed(NamedTuple):
-    """An action, and the segment that it is about."""
+    """An action, and the times of the segment that it is about."""
 
     action: Action
     onset: float  # s
-    offset: float  # s, when it was last touched
+    offset: float  # s, when the segment was touched last
     decided: float  # s
 
 
@@ -255,13 +255,13 @@ class Segmenter:
     def rise(self, t: float, under: float = 0.0) -> None:
         """A contact begins at `t` s, above something that lies there with an activity of `under` noise units."""
         self.contact = Stretch(t)  # the contact that goes on, or the last one
-        self.rests = Stretch(t)  # since when a contact that was given up has stayed in its place
+        self.rests = Stretch(t)  # how long a contact that was given up has stayed in its place
         self.under = under
         self._span = t  # s, when the latest of the spans began
         self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
 
     def lately(self, t: float, activity: float) -> float:
-        """Take a frame at `t` s; return the highest activity of the two spans before the present one, else 0."""
+        """Take a frame at `t` s; return the highest activity of the two spans before this one, 0 without both."""
         older, old, latest = self._tops
         if t - self._span >= SPAN_S:
             older, old, latest, self._span = old, latest, 0.0, t
@@ -288,21 +288,21 @@ class Segmenter:
         return self.phase.levels(self, t)
 
     def push(self, t: float, activity: float, place: Centroid | None) -> list[Deed]:
-        """One frame at `t` s, after `wait(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
+        """Take a frame at `t` s, after `wait(t)`; `place`: its centroid (row, column), if it is as active as `off`."""
         if activity < self.off and self.phase is IDLE:
             return []  # what the first row of the table says, without looking it up
         return self._step(self.phase.reads(self, t, activity), t, activity, place)
 
     @property
     def over(self) -> float | None:
-        """When the wait that goes on is over unless the finger comes back, in s; None where none goes on."""
+        """When the present wait is over unless the finger comes back, in s; None if there is no wait."""
         wait, since = self.phase.wait, self.quiet_since
         return since + float(getattr(self.timing, wait)) if wait and since is not None else None
 
     def wait(self, t: float, sure: float) -> list[Deed]:
-        """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over.
+        """What the time alone decides until `t` s. Call it before `push`: a late frame cannot join what is over.
 
-        A wait that was over while everything was known, until `sure` (s), is decided at its end; another one at `t`.
+        A wait that was over by `sure` (s), before which no frame can be missing, is decided at its end; else at `t`.
         """
         deeds: list[Deed] = []
         while (says := self.phase.says) is not None and (over := self.over) is not None and t >= over:

@@ -1,6 +1,6 @@
-"""What the idle sensor looks like, learned from one second in which nothing moved.
+"""Settling: the idle sensor is learned from one second in which nothing moved.
 
-It is not learned by a filter from the first frame on: that would learn a hand that lies there.
+A filter that begins with the first frame would learn a hand that lies there.
 """
 
 from collections import deque
@@ -13,33 +13,33 @@ from gestured.core.quantiles import median, quantile
 
 Array = NDArray[np.float64]
 
-SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
-LOOK_S = 0.06  # how often it is looked whether the last second was stable
-SETTLE_FRAMES = 64  # frames kept of a second; those of faster sensors are thinned out
-LEAST_FRAMES = 4  # of a second; fewer have no two halves to compare
-PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
-RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
-MOVED = 3  # taxels that may move in a stable second, whatever the sensor's size
-MOVED_ONE_IN = 20  # of a large sensor one taxel in so many may move: bad ones must not keep it from settling
-HALVES = 1.4  # the most that a second's noise may be, in times its quieter half's; above it a movement has just ended
-HALF_CHANGES = 16  # changes of taxels in half a second, from which on that half's noise can be told
-CONSTANT_ONE_IN = 4  # where more than one taxel in so many stands still, standing still is the sensor's way
-SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
-SPIKES_ONE_IN = 8  # frames; where more than one in so many is a spike, none of them is taken for a fault
-JUMP_PER_SIGMA = 1.128  # of normal noise, the mean absolute difference of successive values: 2 / sqrt(pi)
-SIGMA_PER_DEVIATION = 1.2533  # of normal noise, its sigma by its mean absolute deviation: sqrt(pi / 2)
-TREMBLE = 0.35  # of a step: with that much noise a finger's tremble shows in the last digit
-CLIPPED_SHARE = 0.25  # of the taxels: where so many lie at the lowest value twice, the sensor cuts off its noise
-CLIPPED_QUANTILE = 0.75  # of the taxels' noise, where it is cut off: most taxels seem quieter than they are
-PRIOR_FRAMES = 16  # frames that the noise of all taxels weighs: a second of frames knows a taxel's own noise badly
+SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so that jitter cannot miss it
+LOOK_S = 0.06  # the pause between two checks whether the last second was stable
+SETTLE_FRAMES = 64  # the most frames kept of a second; those of faster sensors are thinned out
+LEAST_FRAMES = 4  # the fewest frames of a second, since fewer have no two halves to compare
+PATIENCE_S = 5.0  # a sensor that has not settled by then (hum, a restless hand) is used all the same
+RESTLESS = 5.0  # times the sensor's noise: a taxel that moves more was touched, or is bad
+MOVED = 3  # the most taxels that may move in a stable second: bad ones must not keep a sensor from settling
+MOVED_ONE_IN = 20  # of a small sensor, at most one taxel in so many may move
+HALVES = 1.4  # times the noise of a second's quieter half: more is no noise, but a movement that has just ended
+HALF_CHANGES = 16  # changes of taxels in half a second that suffice to tell the noise of that half
+CONSTANT_ONE_IN = 4  # if more than one taxel in so many stands still, that is this sensor's way, and no fault
+SPIKE = 1000.0  # times the usual jump between frames: a frame that is further off is a fault of the readout
+SPIKES_ONE_IN = 8  # if more than one frame in so many is a spike, none of them is taken for a fault
+JUMP_PER_SIGMA = 1.128  # mean absolute difference of successive values of normal noise, in sigmas: 2 / sqrt(pi)
+SIGMA_PER_DEVIATION = 1.2533  # sigma of normal noise, in mean absolute deviations: sqrt(pi / 2)
+TREMBLE = 0.35  # of a quantisation step: with as much noise, a finger's tremble shows in the last digit
+CLIPPED_SHARE = 0.25  # of the taxels: if so many lie at the lowest value twice, the sensor cuts off its noise
+CLIPPED_QUANTILE = 0.75  # of the taxels' noise if it is cut off, since most taxels then seem quieter than they are
+PRIOR_FRAMES = 16  # weight, in frames, of all taxels' noise: one second tells little of a taxel's own noise
 LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
-LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
-WHOLE = 2.0**52  # counts: from here on every float64 is a whole number, which says nothing
-RESOLUTION = 1e-6  # of the largest count: less than float32 resolves is no step of a sensor
+LIVELY_FRAMES = 10  # frames that suffice to tell that a sensor never sends the same frame twice in a row
+WHOLE = 2.0**52  # counts; from here on every float64 is a whole number, which says nothing of the step
+RESOLUTION = 1e-6  # of the largest count: a step below this is less than float32 resolves, and no sensor's
 
 
 class Learned(NamedTuple):
-    """What a second says of the idle sensor."""
+    """What one second has shown of the idle sensor."""
 
     baseline: Array  # (N,) counts
     noise: Array  # (N,) counts, one standard deviation
@@ -49,7 +49,7 @@ class Learned(NamedTuple):
     step: float  # counts, one quantisation step
     still: bool  # whether nothing changed at all, so that the step is a guess
     lively: bool  # whether no frame repeated the one before it
-    frames: Array  # (n, N) counts that this was learned from
+    frames: Array  # (n, N) counts from which all this was learned
 
     @property
     def stable(self) -> bool:
@@ -71,9 +71,9 @@ class Settling:
             self.since = None
 
     def push(self, t: float, raw: Array, *, patience: bool) -> Learned | None:
-        """Take one frame of (N,) counts; returns what was learned or nothing yet.
+        """Take one frame of (N,) counts at `t` s; returns what was learned, or None as long as nothing was.
 
-        `patience` allows an answer that is not stable after `PATIENCE_S`.
+        With `patience`, a second that is not stable is accepted after `PATIENCE_S`.
         """
         frames = self._frames
         if self.since is None:
@@ -84,7 +84,7 @@ class Settling:
             return None
         learned = _learned(np.array([counts for _, counts in frames]))
         if not learned.stable and not (patience and t - self.since >= PATIENCE_S):
-            while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
+            while t - frames[0][0] >= SETTLE_S - LOOK_S:  # check again soon, since a movement may just have ended
                 frames.popleft()
             return None
         self.clear()
@@ -94,7 +94,8 @@ class Settling:
 def _learned(stack: Array) -> Learned:
     """What (n, N) counts show of the sensor, if it was idle.
 
-    Differences see noise and not slow movement; means of absolute values, since one outlier must not rule.
+    Noise is told by differences, which slow movement hardly changes, and by means of absolute values, since a single
+    outlier must not rule.
     """
     stack = _without_spikes(stack)
     half = len(stack) // 2
@@ -112,7 +113,7 @@ def _learned(stack: Array) -> Learned:
     moved = np.maximum(spread, shift) > RESTLESS * calm
     constant = np.all(jumps == 0, axis=0)
     if clipped or usual < step or np.count_nonzero(constant) > constant.size // CONSTANT_ONE_IN:
-        constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
+        constant[:] = False  # the taxels of a clipped or coarse sensor stand still when idle, which proves no fault
     pooled = (len(stack) * spread**2 + PRIOR_FRAMES * floor**2) / (len(stack) + PRIOR_FRAMES)
     noise = np.maximum(np.sqrt(pooled), floor / 2)
     return Learned(
@@ -128,7 +129,7 @@ def _usual(jumps: Array, *, clipped: bool) -> float:
 
 
 def _without_spikes(stack: Array) -> Array:
-    """(n, N) counts but for single frames that lie beyond all reason: one of them would rule the noise for minutes."""
+    """(n, N) counts without the few frames that are spikes: one spike would rule the noise for minutes."""
     jumps = np.abs(np.diff(stack, axis=0))
     leaps = jumps.max(axis=1)
     quarter = len(leaps) // 4
@@ -139,12 +140,12 @@ def _without_spikes(stack: Array) -> Array:
 
 
 def quantum(stack: Array, jumps: Array) -> float:
-    """One quantisation step in counts of a sensor that has shown (n, N) counts, and these changes; never 0.
+    """The quantisation step in counts of a sensor that has shown (n, N) counts with these `jumps`; never 0.
 
     Whole numbers count in ones; otherwise the smallest change that was seen is taken.
     """
     if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < WHOLE:
         return 1.0
     seen = jumps[jumps > 0]
-    top = float(median(np.abs(stack).max(axis=1)))  # of most frames: one spike must not rule
+    top = float(median(np.abs(stack).max(axis=1)))  # the median over frames, since one spike must not rule
     return max(float(seen.min()) if seen.size else 0.0, top * RESOLUTION, LEAST_STEP)

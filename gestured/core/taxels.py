@@ -1,4 +1,4 @@
-"""Which taxels are bad: those that are stuck, that froze under a finger, or are noisy; and what they would show."""
+"""Bad taxels: which are stuck, frozen under a finger, flickering or noisy, and how they are bridged."""
 
 import math
 
@@ -7,29 +7,29 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-# Of a contact: (N,) taxels that did not change, and those of them whose neighbours were pressed.
+# (N,) taxels that did not change during a contact, and those of them whose neighbours were pressed.
 Still = tuple[Mask, Mask]
 
-NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
-FROZEN_S = 0.4  # a pressed taxel that stays the same to the last digit for so long is no finger
-FROZEN_NOISE = 3.0  # times a taxel's own noise: above this a taxel that froze is pressed
-STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, after which it is stuck
-STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
-STRUCK_NOISE = 8.0  # times the sensor's noise that they have to reach as well
-TURNS = 5  # jumps up and down in one contact, from which on a taxel flickers: no finger does that
-TURNS_TOO = 3  # jumps that are enough where another taxel flickers already, since taxels seldom flicker alone
-TURN_FRAMES = 15  # frames without a turn, after which a taxel's turns are counted anew
+NOISY = 8.0  # times the sensor's noise: a taxel with more is bad
+FROZEN_S = 0.4  # a pressed taxel that stays the same to the last digit for so long shows no finger, which trembles
+FROZEN_NOISE = 3.0  # times a taxel's own noise: above this a taxel counts as pressed
+STRIKES = 2  # a taxel is stuck after so many contacts in which it stood still while its neighbours were pressed
+STRUCK_SHARE = 0.4  # of the contact's peak: a taxel's neighbours that reach a smaller share are not pressed
+STRUCK_NOISE = 8.0  # times the sensor's noise: neighbours below this level are not pressed in any case
+TURNS = 5  # a taxel flickers after so many jumps up and down in one contact, since no finger does that
+TURNS_TOO = 3  # so many jumps suffice if another taxel flickers already, since taxels seldom flicker alone
+TURN_FRAMES = 15  # after so many frames without a turn a taxel's turns are counted anew
 TURN_SHARE = 0.15  # of the taxel's peak in the contact: smaller jumps are a finger's tremble
-ALONE = 4.0  # times its neighbours' peaks: a finger presses those as well, so a taxel above that is no finger's
-HELD_SHARE = 0.5  # of the highest other taxel, from which one that flickers may have made the contact
-RUBBISH_ONE_IN = 2  # taxels; where more than one in so many jumps for RUBBISH_S, the frames are rubbish
-RUBBISH_S = 1.0  # how long a contact must last before its frames are rubbish: a burst passes
-STEADY_FRAMES = 30  # frames without a turn, after which a taxel flickers no more
-NEAR, DIAGONAL = 2.0, 1.0  # weights of a taxel's eight neighbours
+ALONE = 4.0  # times its neighbours' peaks: no finger presses one taxel so much more than those beside it
+HELD_SHARE = 0.5  # of the highest other taxel's peak: a flickering taxel above it may have made the contact alone
+RUBBISH_ONE_IN = 2  # if more than one taxel in so many jumps, the frames are rubbish
+RUBBISH_S = 1.0  # only a contact that has lasted so long can be rubbish for its many jumping taxels: a burst passes
+STEADY_FRAMES = 30  # after so many frames without a turn a taxel flickers no more
+NEAR, DIAGONAL = 2.0, 1.0  # weights of a taxel's neighbours beside it and at its corners
 
 
 class Frozen:
-    """The taxels that stay pressed to the last digit, below the sensor's limit: a finger trembles."""
+    """The taxels that show the same pressure to the last digit, below the sensor's limit, though a finger trembles."""
 
     def __init__(self, taxels: int) -> None:
         self.mask: Mask = np.zeros(taxels, dtype=bool)
@@ -37,7 +37,7 @@ class Frozen:
         self._tells = False  # whether a finger's tremble shows in this sensor's last digit
         self._still_since = np.full(taxels, math.inf)  # s
         self._previous: Array = np.zeros(taxels)  # raw counts
-        self._limit = -math.inf  # the largest raw count seen under a touch; there a taxel stands still without fault
+        self._limit = -math.inf  # the largest raw count under a touch, at which a sound taxel may stand still
 
     def learn(self, *, fine: bool) -> None:
         """The sensor was learned anew: nothing is frozen. `fine`: a finger's tremble shows in its last digit."""
@@ -45,9 +45,9 @@ class Frozen:
         self._set(np.zeros_like(self.mask))
 
     def watch(self, t: float, raw: Array, above: Array, sigma: Array) -> bool:
-        """See (N,) counts and what they are above the baseline, `sigma` being their noise; True if `mask` changed.
+        """Take a frame of (N,) `raw` counts, `above` the baseline, with noise `sigma`; true if `mask` has changed.
 
-        Asked while the sensor is touched, and later as long as a taxel is frozen.
+        Called while the sensor is touched, and later as long as a taxel is frozen.
         """
         changed = raw != self._previous
         self._previous = raw
@@ -74,7 +74,7 @@ class Flickering:
         self._shape = rows, columns
         self.mask: Mask = np.zeros(rows * columns, dtype=bool)
         self.any = False
-        self.rubbish = False  # whether most taxels, or those that held the contact, jumped so: it is no touch
+        self.rubbish = False  # whether the contact is no touch: most taxels jumped so, or those that made the contact
         self._frames = 0  # frames that were seen
         self._turned = np.zeros(rows * columns, dtype=np.int64)  # the frame in which each taxel turned round last
         self.begin(0.0)
@@ -92,9 +92,10 @@ class Flickering:
         self._set(np.zeros_like(self.mask))
 
     def watch(self, t: float, above: Array, noise: float, bad: Mask) -> bool:
-        """See (N,) counts above the baseline at `t` s, `noise` being the sensor's; True if `mask` changed.
+        """Take a frame of (N,) counts `above` the baseline at `t` s; true if `mask` has changed.
 
-        Asked while the sensor is touched, and later as long as a taxel flickers. `bad` taxels held no contact.
+        Called while the sensor is touched, and later as long as a taxel flickers. `noise` is the sensor's, in counts;
+        `bad` (N,) taxels can have made no contact.
         """
         jump, before = above - self._above, self._jump
         back = jump * before
@@ -128,7 +129,7 @@ class Taxels:
 
     def __init__(self, rows: int, columns: int) -> None:
         self.rows, self.columns = rows, columns
-        self._stuck: Mask = np.zeros(rows * columns, dtype=bool)  # those that show the same whatever presses them
+        self._stuck: Mask = np.zeros(rows * columns, dtype=bool)  # taxels that show the same whatever presses them
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self._blameless = False  # whether no taxel has strikes or is stuck
         self.frozen = Frozen(rows * columns)
@@ -137,20 +138,20 @@ class Taxels:
         self.count = 0  # how many taxels are bad
 
     def learn(self, constant: Mask, *, fine: bool) -> None:
-        """The sensor was learned anew. `constant`: (N,) taxels that never changed; `fine`: as `Frozen.learn` has it."""
+        """The sensor was learned anew. `constant`: (N,) taxels that never changed; `fine`: as in `Frozen.learn`."""
         self._stuck, self._blameless = constant, False
         self.frozen.learn(fine=fine)
         self.flickering.learn()
 
     def review(self, sigma: Array, noise: float) -> None:
-        """Say which are bad, by each taxel's noise (N,) and the sensor's. Where all are, none counts as bad."""
+        """Find the bad taxels by each one's noise (N,) and the sensor's. If all taxels are bad, none counts as bad."""
         self.bad = self._stuck | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
         self.count = int(np.count_nonzero(self.bad))
 
     def inspect(self, frames: Array, noise: float) -> Still:
-        """Look at the frames of a contact, (T, N) counts above the baseline, not yet bridged."""
+        """The taxels that stood still in the frames of a contact: (T, N) counts above the baseline, not bridged."""
         if len(frames) < 2:
             return np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool)
         peaks = frames.max(axis=0)
@@ -159,7 +160,7 @@ class Taxels:
         return still, still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
 
     def judge(self, seen: Still) -> bool:
-        """A contact is over: a taxel that stood still under pressure twice is stuck. True if the stuck ones changed."""
+        """A contact is over: a taxel that stood still in STRIKES of them is stuck. True if the stuck ones changed."""
         still, suspect = seen
         if self._blameless and not suspect.any():
             return False
@@ -179,7 +180,7 @@ class Taxels:
 def bridged(frames: Array, bad: Mask) -> Array:
     """(T, R, C) counts -> the same with the (R, C) bad taxels replaced by what their good neighbours show.
 
-    Those inside a bad patch are filled from its rim inwards. Where no taxel is good, nothing is replaced.
+    A patch of bad taxels is filled from its rim inwards. If no taxel is good, nothing is replaced.
     """
     good = ~bad
     if good.all() or not good.any():
