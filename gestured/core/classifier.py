@@ -1,4 +1,4 @@
-"""The Protocol of whatever scores segments (a model, or a ladder of models), and the scores that it gives."""
+"""The classifier's Protocol, for a model or a ladder of models, and the scores that it gives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gestured.core.frames import Segment
 from gestured.core.points import Certainty, Point
 
-NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
+NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, if nothing else is set
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,20 +19,20 @@ class Match:
 
     name: str
     confidence: float
-    nearer: bool  # than any of the model's gestures, by so much that it may take a segment from them
+    nearer: bool  # whether it is so much nearer than the model's gestures that it may take a segment from them
 
 
 @dataclass(frozen=True, slots=True)
 class Scores:
     """What a classifier says of a segment."""
 
-    values: NDArray[np.float32]  # (G,) probabilities given that it is one of the gestures, in the classifier's order
+    values: NDArray[np.float32]  # (G,) probabilities if it is one of the gestures, in the classifier's order
     unknown: float  # probability that it is none of them
-    model: str
+    model: str  # name of the model that answered
     degraded: bool = False  # whether a fallback answered
-    threshold: float = 0.5  # confidence from which it is published where there are no `points`, or a gesture has armed
-    took_s: float = 0.0  # s that the model ran
-    own: Match | None = None  # the nearest gesture of the user's own, where there are any
+    threshold: float = 0.5  # confidence from which it is published without `points`, or on an armed sensor
+    took_s: float = 0.0  # run time
+    own: Match | None = None  # the nearest gesture of the user's own, if there are any
     points: Mapping[str, Point] | None = None  # operating points of the model, by strictness
 
     @property
@@ -48,16 +48,16 @@ class Classifier(Protocol):
 
     @property
     def certainty(self) -> Certainty | None:
-        """How sure the classifier must be of a contact that is not over; None where it was not made for that."""
+        """How sure the classifier must be of a contact that is not over; None if it was not made for that."""
         return None
 
     def classify(self, segment: Segment) -> Scores:
-        """Score one segment; raises ModelError where it cannot."""
+        """Score one segment. Raises ModelError if that fails."""
         ...
 
     def preview(self, segment: Segment) -> Scores | None:
-        """Score the beginning of a segment, None where that fails: no later answer may depend on it.
+        """Score the beginning of a segment; None if that fails. No later answer may depend on it.
 
-        `preview` is called only where there is a `certainty`.
+        It is called only if there is a `certainty`.
         """
         return None

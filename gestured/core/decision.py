@@ -1,4 +1,4 @@
-"""What the scores of a segment mean in a scene: which gesture it is, and whether that is sure enough."""
+"""The decision about a segment: which gesture its scores mean in a scene, and whether that is sure enough."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ class Decision:
 
     The scores of gestures that are not in use are dropped, and not shared out among the others. A segment of which
     the model is not sure enough, or with a hole in which the finger may have moved unseen, is unknown. A gesture of the
-    user's own may take what the model does not know, and what is much nearer to it than to the model's gestures.
+    user's own may take a segment that the model does not know, or one that is much nearer to it than to the model's.
     """
 
     def __init__(self, scene: Scene, sensor: str) -> None:
@@ -23,7 +23,7 @@ class Decision:
         self._strictness = scene.strictness_of(sensor)
         zones = scene.setup(sensor).zones.items()
         self.restricted = {name: frozenset(zone.gestures) for name, zone in zones if zone.gestures is not None}
-        self._last_offset: dict[str, float] = {}  # s, of the last time that each gesture was published
+        self._last_offset: dict[str, float] = {}  # by gesture: s, the offset of the last published one
 
     def may(self, gesture: str, zone: str | None) -> bool:
         """Whether a contact that began in that zone of the sensor may be that gesture."""
@@ -33,9 +33,9 @@ class Decision:
     def best(
         self, gestures: Sequence[str], answer: Scores, zone: str | None = None
     ) -> tuple[dict[str, float], str, float]:
-        """The scores of those of the classifier's `gestures` that are in use, the best of them, and how sure it is.
+        """The scores of the classifier's `gestures` that are in use, the best of them, and its confidence.
 
-        A gesture that may not begin in `zone` cannot be the best; where none may begin there, the confidence is 0.
+        A gesture that may not begin in `zone` cannot be the best; if none may begin there, the confidence is 0.
         """
         scores = {
             gesture: float(value)
@@ -47,10 +47,10 @@ class Decision:
         return scores, best, scores[best] * (1.0 - answer.unknown) if possible else 0.0
 
     def threshold(self, gesture: str, answer: Scores, *, armed: bool) -> float:
-        """The confidence from which an answer is that gesture: the scene's, else that of the model which answers.
+        """The confidence from which an answer is that gesture: the scene's threshold, else the answering model's.
 
-        An operating point is for whole days, in which hardly a contact is meant. On a sensor that a gesture has `armed`
-        most are, so the model's one threshold is enough there.
+        An operating point is made for whole days, in which hardly a contact is meant. On an `armed` sensor most
+        contacts are meant, so the model's one threshold is enough there.
         """
         point = self._point(answer)
         usual = answer.threshold if point is None else point.thresholds[gesture]
@@ -65,7 +65,7 @@ class Decision:
         return None if answer.points is None else answer.points[self._strictness]
 
     def is_own(self, match: Match | None, zone: str | None = None, *, known: bool) -> bool:
-        """Whether a segment is the user's own gesture `match`; `known`: the model alone would have named it."""
+        """Whether a segment is the user's own gesture `match`. `known`: the model is sure enough of one of its own."""
         if match is None or (known and not match.nearer) or not self.may(match.name, zone):
             return False
         return match.confidence >= self._thresholds.get(match.name, NEAR)

@@ -17,12 +17,12 @@ class ProtocolError(GesturedError):
 
 
 class ModelError(GesturedError):
-    """A model file that cannot be used; names the file and what is wrong."""
+    """A model file that cannot be used; the text names the file and what is wrong."""
 
 
 class RecordingError(GesturedError):
-    """A recording that cannot be read or written; names the file, the field and what was expected."""
+    """A recording that cannot be read or written; the text names the file, the field and what was expected."""
 
 
 class SettingsError(GesturedError):
-    """A setting that is not valid; names the key, the value and what was expected."""
+    """A setting that is not valid; the text names the key, the value and what was expected."""

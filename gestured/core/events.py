@@ -1,8 +1,8 @@
 """The events that are published: frozen values in a plain union. Times are seconds on the stream's clock.
 
-An `id` numbers a sensor's segments: each `Onset` is followed by exactly one `Gesture`, `Unknown` or
-`Cancelled`, and by one `Release`. Where somebody asks, at most one `Provisional` comes between onset and answer; the
-answer's `provisional` says what became of it: "confirmed", "revoked", or None where nothing was said.
+An `id` numbers a sensor's segments: each `Onset` is followed by exactly one `Gesture`, `Unknown` or `Cancelled`, and
+by one `Release`. If somebody asks for them, at most one `Provisional` comes between onset and answer; the answer's
+`provisional` says what became of it: "confirmed", "revoked", or None if there was none.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ class Provisional:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place on a sensor as a person in front of it sees it, in fractions of it."""
+    """A place on a sensor as a person in front of it sees it, in fractions of the sensor's sides."""
 
     x: float  # 0..1, from left to right
     y: float  # 0..1, upward
@@ -41,16 +41,16 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """Where a contact was, how far it went and how hard it pressed; of two fingers, their middle."""
+    """Where a segment was, how far it went and how hard it pressed; for two fingers, the middle between them."""
 
     start: Place
     end: Place
     way: float  # length of the path in sides of the shorter edge; 0 where it stayed within the noise
     pressure: float  # counts of the strongest taxel above the idle sensor
-    snr: float  # the same over the noise
+    snr: float  # `pressure` over the noise
     contacts: int  # 1 or 2 fingers at the same time
     bridged: int  # bad taxels under the way
-    zone: str | None = None  # where it began
+    zone: str | None = None  # the zone in which it began
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +67,17 @@ class Gesture:
     decided: float  # s, when it was decided: the end of the wait after the last touched frame, or later
     frames: int  # touched frames, first to last
     lost: int  # frames that went missing between them
-    model: str  # the one that answered
+    model: str  # name of the model that answered
     degraded: bool  # whether a fallback answered
     scores: Mapping[str, float]  # of each of the model's gestures that is in use
     provisional: str | None = None
     own: bool = False  # whether it is a gesture of the user's own
-    where: Where | None = None  # None only where nothing is known of it
+    where: Where | None = None  # None only if nothing is known of it
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A segment that is none of the gestures, or of which the model is not sure enough, or that may be none now.
+    """A segment that is no gesture, of which the model is not sure enough, or that does not count now.
 
     `reason` is confidence (below the threshold), hole (frames were lost), rate (the sensor is too slow or too fast),
     disarmed (the gesture that arms the sensor did not come before) or inhibited (a gate is closed, or was).
@@ -85,7 +85,7 @@ class Unknown:
 
     sensor: str
     id: int
-    confidence: float  # 0..1, of the best gesture; the fields below are those of `Gesture`
+    confidence: float  # 0..1, of the best gesture; the following fields are those of `Gesture`
     onset: float
     offset: float
     decided: float
@@ -97,12 +97,12 @@ class Unknown:
     reason: str = "confidence"  # confidence, hole, rate, disarmed, inhibited
     provisional: str | None = None
     where: Where | None = None
-    gates: tuple[str, ...] = ()  # those that silenced it
+    gates: tuple[str, ...] = ()  # names of the gates that silenced it
 
 
 @dataclass(frozen=True, slots=True)
 class Cancelled:
-    """A contact that is not answered: held too long, cut off by silence, a restart of the sensor ..."""
+    """A contact without a gesture or unknown; `reason` says why."""
 
     sensor: str
     id: int
@@ -124,29 +124,29 @@ class Gate:
     """What a sensor listens to has changed: it is armed now or no longer, or a gate was closed or opened."""
 
     sensor: str
-    armed: bool | None  # None where no gesture arms it
-    closed: tuple[str, ...]  # names of gates; while there is one, every contact is unknown
-    until: float | None  # s, when the first of this changes by itself; None where nothing does
-    since: float  # s; these two are on the hub's clock, by which an operator acts
+    armed: bool | None  # None if no gesture arms it
+    closed: tuple[str, ...]  # names of closed gates; while there is one, every contact is unknown
+    until: float | None  # s, on the hub's clock: when the first of this changes by itself; None if nothing does
+    since: float  # s, on the hub's clock, by which an operator acts
 
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """A finger of a contact that goes on. It is no answer: that follows, or has come already."""
+    """A finger of a contact that goes on. It is no answer: the answer follows, or has come already."""
 
     sensor: str
     id: int  # of the contact
-    touch: int  # counts the contact's fingers from 0
+    touch: int  # number of the finger, counted from 0 in each contact
     phase: str  # down, move, up; each `down` is followed by exactly one `up`
     t: float  # s, when the finger was seen there
     x: float  # 0..1, from left to right
     y: float  # 0..1, upward
-    dx: float  # since the last event of this finger
-    dy: float
+    dx: float  # change of `x` since the last event of this finger
+    dy: float  # change of `y`
     pressure: float  # counts of the strongest taxel above the idle sensor
-    area: int  # taxels above half of that
-    zone: str | None = None  # where it came down
-    reason: str | None = None  # of an `up` where the finger is still there: learned
+    area: int  # taxels above half of `pressure`
+    zone: str | None = None  # the zone in which it came down
+    reason: str | None = None  # of an `up` though the finger is still there: learned
 
 
 TouchEvent = Touch  # its public name, since `gestured.Touch` is a finger's position that a sensor reports
@@ -154,7 +154,7 @@ TouchEvent = Touch  # its public name, since `gestured.Touch` is a finger's posi
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How the daemon is, once a second as a sign of life."""
+    """The state of the daemon, once a second as a sign of life."""
 
     state: str  # "ok", "degraded", "no_data"
     sensors: Mapping[str, str]  # state of each sensor
@@ -164,4 +164,4 @@ class Status:
 
 
 Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Touch | Gate | Status
-ANSWERS = (Gesture, Unknown, Cancelled)  # what a contact ends with; a union would be built with each question
+ANSWERS = (Gesture, Unknown, Cancelled)  # for isinstance, which would build a union anew with each call

@@ -1,4 +1,4 @@
-"""The facts that a hub returns: a plain union, for those who publish, count, compare or keep them."""
+"""The facts that a hub returns, in a plain union: its callers publish, count, compare or keep them."""
 
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
@@ -10,31 +10,31 @@ from gestured.core.owner import Source
 
 
 class Decided(NamedTuple):
-    """A segment that was classified, and whether the model was sure enough; it comes right after its event."""
+    """A segment that was classified, and its scores. This fact comes right after the event about the segment."""
 
     sensor: str
     segment: Segment
     scores: Scores
-    known: bool
+    known: bool  # whether the model was sure enough of a gesture
 
 
 class Arrived(NamedTuple):
-    """What became of the frames of sensors that were found waiting together; the counts are those of each name."""
+    """What became of the frames that were found waiting together. The counts hold for each name in `sensors`."""
 
-    sensors: tuple[str, ...]  # one that several frames came of may stand here as often
+    sensors: tuple[str, ...]  # a sensor may stand here several times, with the counts as often
     taken: int
-    lost: int  # frames missing before these: by the sensor's counter, or as this machine had no room for packets
+    lost: int  # frames missing before these, by the sensor's counter or because this machine had no room
     duplicates: int
     late: int
-    implausible: int  # time tags that were replaced by the arrival
+    implausible: int  # time tags in whose place the arrival was used
 
 
 class Taken(NamedTuple):
-    """A frame that was used. A hub gives these only where its scene asks for `frames`."""
+    """A frame that was used. A hub gives these facts only if its scene asks for `frames`."""
 
     sensor: str
     frame: Frame  # stamped, as it was sent
-    new: bool  # whether the sensor came or restarted just before, so that what was learned of it does not hold
+    new: bool  # whether the sensor came or restarted just before, so that nothing learned before holds
     ready: bool  # whether the idle sensor is known, this frame included
 
 
@@ -55,9 +55,9 @@ class Changed(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A bug: an exception where none may be. The contact of the sensor in whose path it was has been ended."""
+    """A bug: an unexpected exception. The contact of the sensor in whose path it was has been ended."""
 
-    sensor: str | None  # None where a packet could not be taken apart
+    sensor: str | None  # None if it was in no sensor's path, as in a decoder
     error: Exception
 
 
@@ -65,5 +65,5 @@ Fact = Event | Decided | Arrived | Taken | Dropped | Changed | Fault
 
 
 def events_of(found: Iterable[Event | Decided]) -> list[Event]:
-    """The events among what a sensor told."""
+    """The events among what a sensor returns."""
     return [one for one in found if not isinstance(one, Decided)]

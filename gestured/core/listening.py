@@ -1,7 +1,7 @@
-"""Whether what is felt on a sensor counts: a gesture may have to arm it, and gates may silence it.
+"""Arming and gates: whether contacts count, since a gesture may have to arm a sensor, and gates may silence it.
 
-A contact is judged by its onset, so that it is silent or not as a whole. A gate has a name, so that what one opens
-another keeps closed: a sensor is silent while any of its gates is closed.
+A contact is judged by its onset, so it is silenced as a whole or not at all. Gates have names, so that several callers
+do not undo each other's work: a sensor is silent while any of its gates is closed.
 """
 
 import math
@@ -12,8 +12,8 @@ from typing import Any
 from gestured.core.events import Gate
 
 DISARMED, INHIBITED = "disarmed", "inhibited"  # reasons of `Unknown`
-MOST_GATES = 16  # names of gates that are closed at a time
-LONGEST_S = 3600.0  # that a sensor may stay armed without a gesture
+MOST_GATES = 16  # the most names of gates that are closed at a time
+LONGEST_S = 3600.0  # the longest that a sensor may stay armed without a gesture
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Arming:
 
     @classmethod
     def of(cls, told: Any) -> "Arming | None":
-        """What settings tell, as a mapping with `by` and perhaps `seconds`; None where they tell nothing."""
+        """The arming of a setting, a mapping with `by` and perhaps `seconds`; None for None. Raises ValueError."""
         if told is None:
             return None
         if not isinstance(told, Mapping) or not told.keys() <= {"by", "seconds"} or not isinstance(told.get("by"), str):
@@ -53,7 +53,7 @@ class Listening:
         return onset <= self._silent_until
 
     def hears(self, onset: float) -> bool:
-        """Whether a contact that began then may be any gesture, and not only the one that arms."""
+        """Whether a contact that began then may be any gesture, and not only the one that arms the sensor."""
         return not self.silences(onset) and (self.arming is None or onset <= self.armed_until)
 
     def refusal(self, onset: float, gesture: str | None) -> str | None:
@@ -64,27 +64,27 @@ class Listening:
         return None if free or onset <= self.armed_until else DISARMED
 
     def heard(self, t: float) -> bool:
-        """A gesture was published at `t`, and begins the seconds anew. Returns whether there is something to tell."""
+        """Begin the armed time anew, as a gesture was published at `t`. Returns whether a `Gate` event is due."""
         if self.arming is None:
             return False
         self.arm(t + self.arming.seconds)
         return True
 
     def arm(self, until: float) -> None:
-        """Every gesture counts of a contact that begins until then."""
+        """Arm the sensor: any gesture counts whose contact begins until then."""
         self.armed, self.armed_until = True, until
 
     def lapse(self, t: float, onset: float | None) -> bool:
-        """Whether the seconds have run out by `t`, which is to be told. A contact that began before still counts.
+        """End the armed time if it has run out by `t`. Returns whether it has, so that a `Gate` event is due.
 
-        `onset` is when the contact began whose answer is open, None where there is none.
+        `onset`: when the contact without an answer began, None if there is none. One that began in time still counts.
         """
         over = self.armed and t > self.armed_until and (onset is None or onset > self.armed_until)
         self.armed = self.armed and not over
         return over
 
     def gate(self, closed: Mapping[str, float], past: float) -> bool:
-        """Close these gates; a contact that began by `past` counts as begun before. Returns whether to tell it."""
+        """Close exactly these gates; contacts that began by `past` are silenced, too. Returns whether to tell of it."""
         if closed == self.closed:
             return False
         if closed:
@@ -95,7 +95,7 @@ class Listening:
         return True
 
     def change(self, arming: Arming | None, *, another_clock: bool) -> bool:
-        """Go on in another scene. Returns whether there is something to tell."""
+        """Go on in another scene. Returns whether a `Gate` event is due."""
         if another_clock and not self.closed:
             self._silent_until = -math.inf
         if arming == self.arming and not another_clock:
@@ -105,23 +105,23 @@ class Listening:
         return told
 
     def told(self, sensor: str, since: float, armed_until: float) -> Gate:
-        """What the sensor listens to, as a `Gate` event; all times, `armed_until` too, are on the hub's clock."""
+        """The `Gate` event that says what the sensor listens to; its times and `armed_until` are on the hub's clock."""
         armed = None if self.arming is None else self.armed
         until = min((*self.closed.values(), *([armed_until] if self.armed else [])), default=math.inf)
         return Gate(sensor, armed, tuple(sorted(self.closed)), until if until < math.inf else None, since)
 
 
 class Gates:
-    """Gates that are closed, by sensor, heard yet or not. Times are seconds on the hub's clock."""
+    """The closed gates of all sensors, heard yet or not. Times are seconds on the hub's clock."""
 
     def __init__(self, start: Iterable[str] = ()) -> None:
-        """`start`: closed for all sensors from the beginning."""
-        self._all: dict[str, float] = dict.fromkeys(start, math.inf)  # for sensors that were told nothing else
+        """`start`: the gates that are closed for all sensors from the beginning."""
+        self._all: dict[str, float] = dict.fromkeys(start, math.inf)  # for sensors that are not in `_of`
         self._of: dict[str, dict[str, float]] = {}  # by sensor, by name: when it opens by itself
         self.due = math.inf  # when the next one opens by itself
 
     def of(self, sensor: str | None) -> Mapping[str, float]:
-        """What is closed for a sensor, or (None) for each that comes; by name when it opens by itself."""
+        """By name of a closed gate: when it opens by itself; for a sensor, or (None) for each new one."""
         return (self._all if sensor is None else self._of.get(sensor, self._all)).copy()
 
     @property
@@ -130,7 +130,7 @@ class Gates:
         return set(self._all).union(*self._of.values())
 
     def inhibit(self, sensor: str | None, gate: str, until: float) -> None:
-        """Close a gate for a sensor, or (None) for all of them and all that come."""
+        """Close a gate for a sensor, or (None) for all, even new ones."""
         for closed in self._told(sensor):
             closed[gate] = until
         self._look()
@@ -149,10 +149,10 @@ class Gates:
         self._look()
 
     def put(self, sensor: str, closed: Iterable[str]) -> None:
-        """Exactly these are closed for a sensor, until they are opened."""
+        """Close exactly these gates for a sensor, until they are opened."""
         theirs = dict.fromkeys(closed, math.inf)
         if theirs != self._all:
-            self._of[sensor] = theirs  # nothing of it opens by itself, so that `due` is not looked for among all others
+            self._of[sensor] = theirs  # none of these opens by itself, so `due` need not be computed anew
         else:
             self._of.pop(sensor, None)
 

@@ -1,6 +1,6 @@
 """The lines of the event socket, as JSON: what a client is told, and what it asks to hear.
 
-A request that is none is a ProtocolError with the reason `subscription`.
+An invalid request is a ProtocolError with the reason `subscription`.
 """
 
 import json
@@ -13,15 +13,15 @@ from gestured.core.errors import ProtocolError
 from gestured.core.events import Event, Gesture, Provisional, Status, Touch, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
-LONGEST = 60  # characters of what a peer sent, in an answer to it
+LONGEST = 60  # the most characters of what a peer sent that an answer quotes
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
 STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since", "t"))
-# Fields that a line has only where they say something else than this.
+# By type and field: the value with which a line leaves the field out.
 _UNSAID: dict[tuple[str, str], object] = {
     ("gesture", "own"): False, ("gesture", "where"): None, ("unknown", "where"): None, ("unknown", "gates"): (),
     ("touch", "reason"): None,
 }  # fmt: skip
-# By type: of each field its name, whether it is a time, and the value that is left unsaid.
+# By type, for each field: its name, whether it is a time, and the value with which it is left out.
 _FIELDS = {
     kind: tuple((one.name, one.name in STREAM_TIMES, _UNSAID.get((kind, one.name), ...)) for one in fields(cls))
     for kind, cls in zip(EVENT_TYPES, get_args(Event), strict=True)
@@ -29,7 +29,7 @@ _FIELDS = {
 
 
 def json_object(text: str | bytes) -> dict[str, Any] | None:
-    """The JSON object in somebody else's text, bytes as UTF-8; None where it is anything else, or nested too deeply."""
+    """The JSON object in somebody else's text, bytes as UTF-8; None for anything else, or if it is nested too deep."""
     try:
         found = json.loads(text.decode() if isinstance(text, bytes) else text)
     except (ValueError, RecursionError):
@@ -43,7 +43,7 @@ def event_type(event: Event) -> str:
 
 
 def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
-    """One JSON line; stream time + `epoch` s = time since the Unix epoch. A test's has one key more: `"test":true`.
+    """One JSON line. Stream time + `epoch` s = time since the Unix epoch; with `test` it has the key `"test":true`.
 
     Raises ValueError for a NaN or an infinity, which no event may hold.
     """
@@ -66,7 +66,7 @@ def hello_json(  # noqa: PLR0913 - each is a key of the line
     sensors: Mapping[str, int],
     gates: Mapping[str, Mapping[str, Any]],
 ) -> bytes:
-    """The first line to a client; `sensors` has the last sequence of each, `gates` what gates and arming say."""
+    """The first line to a client; by sensor, `sensors` has the last sequence, and `gates` its gates and arming."""
     return json_line(
         {
             "type": "hello",
@@ -82,22 +82,22 @@ def hello_json(  # noqa: PLR0913 - each is a key of the line
 
 
 def gestures_json(gestures: Sequence[str]) -> bytes:
-    """Tells every client which gestures there are from now on, the user's own after the model's."""
+    """The line with the gestures that there are from now on, the user's own after the model's."""
     return json_line({"type": "gestures", "gestures": list(gestures)})
 
 
 def lost_json(count: int) -> bytes:
-    """Tells a client how many lines it was too slow for."""
+    """The line that tells a client how many lines it has missed because it was too slow."""
     return json_line({"type": "lost", "count": count})
 
 
 def error_json(reason: str) -> bytes:
-    """Tells a client what was wrong with its request."""
+    """The line that tells a client what was wrong with its request."""
     return json_line({"type": "error", "reason": reason})
 
 
 def quoted(value: object) -> str:
-    """How an answer names what a peer sent: as JSON, cut where it is long."""
+    """What a peer sent as an answer quotes it: JSON, cut after LONGEST characters."""
     text = json.dumps(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
@@ -108,7 +108,7 @@ def json_line(value: Mapping[str, Any]) -> bytes:
 
 
 def _plain_value(value: Any) -> Any:
-    """What JSON knows in place of a mapping of any kind, of `Where`, or of one of numpy's numbers."""
+    """The plain value that JSON knows for a mapping of any kind, for `Where`, or for a number of numpy's."""
     if isinstance(value, Where):
         return asdict(value)
     return dict(value) if isinstance(value, Mapping) else value.item()
@@ -128,13 +128,14 @@ class Subscription:
 
     @property
     def costly(self) -> bool:
-        """Whether it asks for events that are made only where somebody does."""
+        """Whether it asks for events that are made only if somebody asks for them."""
         return not self.types.isdisjoint(("provisional", "touch"))
 
     def matches(self, event: Event) -> bool:
-        """`sensors` filters what is one sensor's, `gestures` what has a gesture's name, `zones` what has a place.
+        """Whether the client wants to hear an event.
 
-        The rest passes.
+        `sensors` filters events of one sensor, `gestures` those with a gesture's name, `zones` those with a place. A
+        filter lets all other events pass.
         """
         if event_type(event) not in self.types:
             return False
@@ -148,7 +149,7 @@ class Subscription:
 
 
 def parse_subscription(line: bytes, known: Mapping[str, Collection[str]]) -> Subscription:
-    """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected.
+    """A client's request, `{"subscribe": {...}}`. Raises ProtocolError, whose text says what was expected.
 
     `known` are the `gestures` and `zones` that a client may name. A sensor may be named before it comes.
     """
@@ -168,7 +169,7 @@ def parse_subscription(line: bytes, known: Mapping[str, Collection[str]]) -> Sub
 
 
 def _names(key: str, value: object, known: Mapping[str, Collection[str]]) -> frozenset[str]:
-    """One filter of a request, of what is `known` by its key. Raises ProtocolError."""
+    """One filter of a request; `known`: by key, the names that it may hold. Raises ProtocolError."""
     if key not in known:
         raise _refused(f"subscribe: unknown key {quoted(key)}, expected types, sensors, gestures or zones")
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):

@@ -1,7 +1,7 @@
-"""Gestures of the user's own: their examples, and how they are written down.
+"""Gestures of the user's own: their examples, and the JSON values in which they are stored.
 
-An example is kept as a window, so that any model can make its own embedding of it: regridded, retimed and normalised as
-the model that was there when it was enrolled had it.
+An example is kept as the window of the model that was there at its enrolment: regridded, retimed and normalised. So
+any model can make its own embedding of it.
 """
 
 import base64
@@ -20,16 +20,16 @@ from gestured.core.window import LEAST_PEAK, Window
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
 RESERVED = ("use", "unknown", "none")  # words that configuration, answers and recordings use
-MOST = 20  # gestures of the user's own
-EXAMPLES = 5  # of one gesture, at most
-MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
-MOST_S = 8.0  # of an example; a contact is given up after five seconds, and quiet frames stand around it
-MOST_VALUES = 16_384  # of an example
+MOST = 20  # the most gestures of the user's own
+EXAMPLES = 5  # the most examples of one gesture
+MOST_FRAMES = 200  # the most of an example; the longest contact takes some 80 at 15 Hz
+MOST_S = 8.0  # the longest example; a contact is given up after five seconds, and has quiet frames around it
+MOST_VALUES = 16_384  # the most of an example
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Example:
-    """One performance, as a window. Raises ValueError, which names the number, for what no performance can be."""
+    """One performance, as a window. Raises ValueError, which names the field, for values that no performance has."""
 
     frames: NDArray[np.float16]  # (T, R, C), 1 at its peak
     rate_hz: float
@@ -56,7 +56,7 @@ class Example:
 
     @classmethod
     def of(cls, segment: Segment, window: Window) -> "Example | None":
-        """A segment as a model's window; None for one that is too long, or not finite."""
+        """The example of a segment, as a model's window; None for a segment that is too long, or not finite."""
         frames = window.apply(segment)
         if not len(frames):
             return None
@@ -98,7 +98,7 @@ def to_dict(gestures: Examples) -> dict[str, Any]:
 
 
 def from_dict(told: object) -> Examples:
-    """Gestures from what `to_dict` gave; ValueError names the place and says what was expected."""
+    """The gestures that `to_dict` gave. Raises ValueError, which names the place and says what was expected."""
     if not isinstance(told, dict) or len(told) > MOST:
         raise ValueError(f"gestures: expected an object of at most {MOST} gestures")
     found: dict[str, tuple[Example, ...]] = {}

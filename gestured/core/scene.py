@@ -21,8 +21,8 @@ from gestured.core.wire import Addresses
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # least, most: no hand taps twice faster (at 15 Hz), and taps further apart are two
-STALE_S = (0.2, 60.0)  # least, most; a slow sensor may pause for the least, and nobody waits longer than the most
-MOST_SENSORS = 4096
+STALE_S = (0.2, 60.0)  # least, most: the slowest sensor pauses for the least, and nobody waits longer than the most
+MOST_SENSORS = 4096  # the most that a scene may name or have places for
 
 Clock = Literal["arrival", "sensor"]
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -30,7 +30,7 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How one sensor is built, mounted and clocked; where a field is None, the scene's own value holds."""
+    """How one sensor is built, mounted and clocked; the scene's own value holds for a field that is None."""
 
     grid: tuple[int, int] | None = None  # rows and columns of its frames, as they are sent
     mounting: Mounting = Mounting()
@@ -45,7 +45,7 @@ AS_SCENE = Setup()
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """All that decides. Raises ValueError, which names the field, for a value that cannot be."""
+    """All that decides what is recognised. Raises ValueError, which names the field, for a value out of range."""
 
     gestures: tuple[str, ...]  # those in use, in the model's order
     grid: tuple[int, int]  # rows and columns of a sensor that has none of its own
@@ -58,13 +58,13 @@ class Scene:
     allow: tuple[Network, ...] = ()  # who may send; anybody where it is empty
     thresholds: Mapping[str, float] = field(default_factory=dict)  # by gesture: confidences in place of the model's own
     strictness: Strictness = USUAL  # the operating point of the model that answers, where `thresholds` says nothing
-    refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s in which it is not published again
+    refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s for which it is not published again
     arming: Arming | None = None  # the gesture before which no other counts
-    gates: tuple[str, ...] = ()  # closed for every sensor where a hub begins
-    provisional_taps: bool = True  # whether a tap is said provisionally while a second one may follow
-    touch: bool = False  # whether fingers may be followed while they touch: who presses what, when, is personal
-    touches: bool = False  # whether finger positions are kept
-    frames: bool = False  # whether the hub tells of each frame that it used
+    gates: tuple[str, ...] = ()  # the gates that are closed for every sensor when a hub begins
+    provisional_taps: bool = True  # whether a tap may be a provisional event while a second tap may follow
+    touch: bool = False  # whether there may be touch events; they are personal data, since they show what is pressed
+    touches: bool = False  # whether the finger positions that sensors send are kept
+    frames: bool = False  # whether the hub gives a fact `Taken` for each frame that it used
 
     def __post_init__(self) -> None:
         if not self.gestures:
@@ -97,9 +97,9 @@ class Scene:
 
     @classmethod
     def from_dict(cls, told: Mapping[str, Any], gestures: tuple[str, ...], grid: tuple[int, int]) -> "Scene":
-        """The scene of a daemon whose settings are `told`, as values or as JSON holds them. Other keys are passed over.
+        """The scene of a daemon's settings `told`, as values or as JSON holds them. Other keys are passed over.
 
-        `gestures` are those in use, `grid` holds where the settings name none. What is missing has its default.
+        `gestures` are those in use; `grid` is used if the settings name none. What is missing has its default.
         Raises ValueError, KeyError, TypeError, AttributeError or OverflowError for what no daemon's settings can be.
         """
         parts = told.get("per_gesture", {}).items()
@@ -121,7 +121,7 @@ class Scene:
         )
 
     def setup(self, sensor: str) -> Setup:
-        """What is set for a sensor; the defaults where it is not named."""
+        """The setup of a sensor; the defaults if the scene does not name it."""
         return self.sensors.get(sensor, AS_SCENE)
 
     def grid_of(self, sensor: str) -> tuple[int, int]:
@@ -129,7 +129,7 @@ class Scene:
         return self.setup(sensor).grid or self.grid
 
     def clock_of(self, sensor: str) -> Clock:
-        """Which clock the times of a sensor's frames come from."""
+        """The clock from which a sensor's frames have their times."""
         return self.setup(sensor).clock or self.clock
 
     def strictness_of(self, sensor: str) -> Strictness:
@@ -137,7 +137,7 @@ class Scene:
         return self.setup(sensor).strictness or self.strictness
 
     def arming_of(self, sensor: str) -> Arming | None:
-        """What arms a sensor; None where it always listens."""
+        """The arming of a sensor; None if it always listens."""
         return self.setup(sensor).arming or self.arming
 
     @property
@@ -154,13 +154,13 @@ class Scene:
 
     @property
     def timing(self) -> Timing:
-        """Durations of the segmenter."""
+        """The waits of segmenter and front end."""
         return Timing(stale_s=self.stale_s, tap_gap_s=self.tap_gap_s)
 
     def may_send(self, host: str) -> bool:
-        """Whether a host's address lies in one of the networks of `allow`; any does where there are none.
+        """Whether a host's address lies in one of the networks of `allow`; true if there are none.
 
-        A name, as a tape may hold one, is no address.
+        A host name, which a tape may hold, lies in no network.
         """
         if not self.allow:
             return True

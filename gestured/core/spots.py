@@ -1,4 +1,4 @@
-"""The fingers of one frame: where each presses, to a fraction of a taxel, how hard, and on how many taxels.
+"""The spots of one frame: where each finger presses, to a fraction of a taxel, how hard, and on how many taxels.
 
 Each position is a least-squares fit of a Gaussian spot on a flat base to the taxels around a peak, found in a table of
 spots (offset and width) and refined by a parabola through the best one's neighbours. A fit takes only the taxels that
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Taxels = NDArray[np.int64]
 
-REACH = 2  # taxels on each side of a peak that a fit looks at
-WIDTHS = (0.7, 1.0)  # pitches, one standard deviation: fingertips on taxels of 4 to 8 mm; more widths place no better
-STEP, STEPS = 0.25, 3  # pitches from one offset of the table to the next, and how many on each side of the peak
+REACH = 2  # taxels on each side of a peak that are fitted
+WIDTHS = (0.7, 1.0)  # taxel pitches, standard deviations of spots: fingertips on taxels of 4 to 8 mm; more do no better
+STEP, STEPS = 0.25, 3  # taxel pitches between two offsets of the table, and offsets on each side of the peak
 BASE = 0.5  # variance of the flat base in units of a taxel's noise: crosstalk and a palm lift what is around a finger
-SIDE = 2 * STEPS + 1
-TABLES = 64  # tables that are kept: one for each way in which the border cuts the taxels around a peak
-PEAKS = 1024  # places of a peak for which it is kept which taxels are around it: those of several sensors
-SECOND = 0.4  # of the first finger's peak: a second one is at least as strong, since a palm and crosstalk are not
-VALLEY = 0.85  # of the second peak: what lies between two fingers is at most so high
+SIDE = 2 * STEPS + 1  # offsets of the table in each direction
+TABLES = 64  # the most tables that are kept: one for each way in which the border cuts the taxels around a peak
+PEAKS = 1024  # the most places of a peak, on several sensors, for which the taxels around it are kept
+SECOND = 0.4  # of the first finger's peak: a second finger is at least so strong, and a palm or crosstalk is not
+VALLEY = 0.85  # of the second peak: between two fingers a frame is at most so high
 NOISE = 4.0  # noise units: a lower peak is no second finger
-APART = 2 * REACH  # taxels: fingers that are nearer are fitted to their own taxels alone
+APART = 2 * REACH  # taxels: each of two fingers that are nearer is fitted only to itself and its neighbours
 
 
 _new = tuple.__new__  # Spot(...) takes twice the time
@@ -34,22 +34,22 @@ class Spot(NamedTuple):
     """One finger in one frame."""
 
     row: float  # taxel pitches from the top, as mounted; within the grid
-    column: float  # from the left
+    column: float  # taxel pitches from the left
     peak: float  # counts of its strongest taxel
-    area: int  # taxels above half of that
+    area: int  # taxels above half of `peak`
 
 
 class Peak(NamedTuple):
-    """The strongest taxel of a finger, and which taxels are looked at because it is."""
+    """The strongest taxel of a finger, and the taxels that matter for it; all are indices, counted row by row."""
 
-    taxel: int  # as all taxels here, counted row by row
+    taxel: int
     row: float
     column: float
     last_row: float  # of the grid
     last_column: float
-    beside: Taxels  # itself and those next to it
-    others: Taxels  # all but these
-    around: Taxels  # (n,) those of its fit
+    beside: Taxels  # the peak and the taxels next to it
+    others: Taxels  # all taxels but those
+    around: Taxels  # (n,) the taxels that are fitted
     table: Array  # (n, W * SIDE * SIDE) their weights
 
 
@@ -98,7 +98,7 @@ def _place(frame: Array, peak: Peak) -> tuple[float, float]:
     fits = frame[around].dot(table)
     best, fit = int(fits.argmax()), fits.item
     down, across, one_down, one_across = _OFFSETS[best]
-    # A parabola through the best fit's neighbours; at the edge of the table these are the best fit itself.
+    # A parabola goes through the best fit and its neighbours; at the edge of the table it is its own neighbour.
     top, above, below = fit(best), fit(best - one_down), fit(best + one_down)
     left, right = fit(best - one_across), fit(best + one_across)
     bend, turn = above - 2 * top + below, left - 2 * top + right
@@ -110,7 +110,7 @@ def _place(frame: Array, peak: Peak) -> tuple[float, float]:
 
 
 def _offset(best: int) -> tuple[int, int, int, int]:
-    """Steps of an entry of the table from the peak, downward and across, and how far it is to its neighbours there."""
+    """Steps of an entry of the table from the peak, down and across, and how far away its neighbours' entries are."""
     down, across = divmod(best % SIDE**2, SIDE)
     return down - STEPS, across - STEPS, SIDE * (0 < down < SIDE - 1), int(0 < across < SIDE - 1)
 
@@ -120,7 +120,7 @@ _OFFSETS = [_offset(best) for best in range(len(WIDTHS) * SIDE**2)]
 
 @lru_cache(PEAKS)
 def _peak(shape: tuple[int, int], taxel: int, reach: int) -> Peak:
-    """A peak at a taxel, for a fit of those that are there within `reach` of it."""
+    """A peak at a taxel, for a fit to the taxels of the grid that are within `reach` of it."""
     (row, column), (rows, columns) = divmod(taxel, shape[1]), shape
     above, below = min(reach, row), min(reach, rows - 1 - row)
     left, right = min(reach, column), min(reach, columns - 1 - column)
@@ -134,7 +134,7 @@ def _peak(shape: tuple[int, int], taxel: int, reach: int) -> Peak:
 
 @lru_cache(PEAKS)
 def _pair(shape: tuple[int, int], first: int, second: int) -> tuple[Taxels, NDArray[np.bool_]]:
-    """Of two peaks: the taxels along the line between them, and (R * C,) whether one is nearer to the first."""
+    """The taxels along the line between two peaks, and (R * C,) whether a taxel is nearer to the first."""
     (row, column), (down, across), columns = divmod(first, shape[1]), divmod(second, shape[1]), shape[1]
     steps = 2 * max(abs(down - row), abs(across - column))
     shares = [k * (1.0 / steps) for k in range(1, steps)]
@@ -146,10 +146,10 @@ def _pair(shape: tuple[int, int], first: int, second: int) -> tuple[Taxels, NDAr
 
 @lru_cache(TABLES)
 def _table(above: int, below: int, left: int, right: int) -> Array:
-    """(n, W * SIDE * SIDE) weights: the product of the n taxels around a peak with them is greatest for the best fit.
+    """(n, W * SIDE * SIDE) weights, whose product with the n taxels around a peak is greatest for the best fit.
 
-    For a spot s of unit height, noise that is white and a base of variance `BASE`, with K the inverse of their joint
-    covariance, the residual of the best height is least where s K z / sqrt(s K s) is greatest (z: the taxels).
+    Let s be a spot of unit height, z the taxels, and K the inverse of the covariance of white noise plus a base of
+    variance `BASE`. At the best height of each spot, the residual is least where s K z / sqrt(s K s) is greatest.
     """
     y, x = (axis.ravel().astype(np.float64) for axis in np.mgrid[-above : below + 1, -left : right + 1])
     inverse = np.eye(y.size) - BASE / (1.0 + BASE * y.size)

@@ -1,4 +1,4 @@
-"""Where a contact was, how far it went and how hard it pressed: what is said of a segment beside its name.
+"""Where a segment was, how far it went and how hard it pressed, as events say beside its name.
 
 A sensor's zones are rectangles that share no place. The one in which a contact begins is its zone.
 """
@@ -19,38 +19,38 @@ from gestured.core.spots import places
 
 Array = NDArray[np.float64]
 
-MOST = 100  # frames of a segment that are looked at, evenly spread: a finger is followed at 20 Hz for its longest 5 s
-SEEN = 0.3  # of the segment's peak: a frame as strong as that says where the finger is
-BOTH = 0.5  # of the segment's peak: such frames say whether there are two fingers, in more than half of them
-SHAKE = 4.0  # pitches by which a place of a peak as high as the noise is uncertain; less with a higher peak
-FINE = 1e4  # parts of a sensor's side to which places are told; `round` to four digits takes twice the time
-UNDER = 1.0  # pitches from the way within which a bad taxel counts as under it
-MOST_ZONES = 64  # of one sensor: each is held against each other one, and a tape may come from anybody
+MOST = 100  # the most frames of a segment that are used, evenly spread: 20 a second for the longest contact of 5 s
+SEEN = 0.3  # of the segment's peak: only stronger frames say where the finger is
+BOTH = 0.5  # of the segment's peak: only stronger frames say, by more than half of them, whether there are two fingers
+SHAKE = 4.0  # taxel pitches: the uncertainty of a place whose peak is as high as the noise; it falls as the peak rises
+FINE = 1e4  # parts of a sensor's side to which places are rounded; `round` to four digits takes twice the time
+UNDER = 1.0  # taxel pitches: a bad taxel that is so near to the way counts as under it
+MOST_ZONES = 64  # the most of one sensor: each is compared with each other, and a tape may come from anybody
 
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """One zone, half open but for the sensor's own last edges."""
+    """One zone of a sensor. Its right and top edges belong to it only where they are the sensor's own."""
 
     at: tuple[float, float, float, float]  # left, bottom, right, top: fractions of the sensor as a person sees it
     gestures: tuple[str, ...] | None = None  # those that may begin here; None is all
 
     def holds(self, place: Place) -> bool:
-        """Whether a place lies in it."""
+        """Whether a place lies in the zone."""
         left, bottom, right, top = self.at
         across = left <= place.x < right or place.x == right == 1
         return across and (bottom <= place.y < top or place.y == top == 1)
 
 
 def zone_at(zones: Mapping[str, Zone], place: Place) -> str | None:
-    """The name of the zone in which a place lies; None where it is none."""
+    """The name of the zone in which a place lies; None if there is none."""
     return next((name for name, zone in zones.items() if zone.holds(place)), None)
 
 
 def zones_of(told: Mapping[str, Any]) -> dict[str, Zone]:
-    """Zones by name, each told as its four numbers or as a mapping with `at` and perhaps `gestures`.
+    """Zones by name, from a setting with four numbers for each, or a mapping with `at` and perhaps `gestures`.
 
-    Raises ValueError, which names the zone, or both where two overlap.
+    Raises ValueError, which names the zone, or both zones if two overlap.
     """
     if not isinstance(told, Mapping):
         raise ValueError(f"zones: expected four numbers for each name, found {told!r}")
@@ -85,7 +85,7 @@ def _zone(name: str, told: Any) -> Zone:
 
 
 def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
-    """Where a segment was, and in which of the sensor's zones. Any segment has an answer, whatever its taxels show."""
+    """The place of a segment, and in which of the sensor's zones it began. Any segment has one, whatever it shows."""
     touched = segment.frames[segment.first : segment.last + 1]
     rows, columns = touched.shape[1:]
     peaks = touched.max(axis=(1, 2)).astype(np.float64)
@@ -114,18 +114,18 @@ def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
 
 
 def middle(fingers: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """The row and column half-way between one or two fingers'."""
+    """The row and column of one finger, or half-way between two."""
     (row, column), (down, across) = fingers[0], fingers[-1]
     return (row + down) / 2, (column + across) / 2
 
 
 def fractions(rows: int, columns: int, row: float, column: float) -> tuple[float, float]:
-    """A row and a column of a grid as fractions of it, to the right and upward."""
+    """A row and a column of a grid as fractions (x, y) of its sides, to the right and upward."""
     return round(column / (columns - 1) * FINE) / FINE, round((1.0 - row / (rows - 1)) * FINE) / FINE
 
 
 def _way(path: Sequence[tuple[float, float]], rests: float) -> float:
-    """The length of a path, 0 where it never goes as far as `rests` from where it was; in pitches."""
+    """The length of a path in taxel pitches, between places at least `rests` apart; 0 if it never goes so far."""
     length, last = 0.0, path[0]
     for each in path:
         step = math.dist(last, each)
@@ -135,7 +135,7 @@ def _way(path: Sequence[tuple[float, float]], rests: float) -> float:
 
 
 def _under(bad: NDArray[np.bool_], path: Array) -> int:
-    """How many of (R, C) bad taxels lie within `UNDER` of a path (n, 2)."""
+    """How many of the (R, C) `bad` taxels lie within `UNDER` of an (n, 2) path."""
     taxels = np.argwhere(bad)[:, None].astype(np.float64)  # (B, 1, 2)
     begin, step = path, np.diff(path, axis=0, append=path[-1:])
     along = ((taxels - begin) * step).sum(axis=2) / np.maximum((step**2).sum(axis=1), 1e-12)
@@ -144,5 +144,5 @@ def _under(bad: NDArray[np.bool_], path: Array) -> int:
 
 
 def digits(value: float) -> float:
-    """A number to six digits: more of them would only make each line longer."""
+    """A number to six digits, since more would only make each line longer."""
     return float(f"{value:.6g}")

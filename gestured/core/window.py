@@ -1,4 +1,4 @@
-"""From a segment to a net's input: the model's grid, rate and scale. Part of the model, stored in its metadata."""
+"""The window: a segment in a model's grid, rate and scale, as its net takes it. A model's metadata describe it."""
 
 import json
 import math
@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 
-SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
-SLACK = 0.25  # of the model's interval, by which a window is longer: jitter must not decide whether a frame is in
-USED = 0.3  # of the most pressed row or column of a long sensor: those above it are part of the movement
-RIM = 2.0  # taxel pitches around the movement that are taken in with it, both sides together
-DEEPEST = 1e6  # times the peak: deeper below the baseline nothing is told apart
+SAME_RATE = 0.12  # of the model's interval: frames so nearly as far apart are not interpolated, which would blur taps
+SLACK = 0.25  # of the model's interval: a window is so much longer, since jitter must not decide whether a frame is in
+USED = 0.3  # of the most pressed row or column of a long sensor: rows or columns above that are part of the movement
+RIM = 2.0  # taxel pitches around the movement that are taken in with it, on both sides together
+DEEPEST = 1e6  # times the peak: values are cut off so far below the baseline
 LEAST_PEAK = 1e-37  # counts; its reciprocal is still a number in float32
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """How a segment is prepared for a model."""
+    """How a segment is prepared for one model."""
 
     rows: int
     columns: int
     rate_hz: float
-    smooth_frames: int  # running average over so many frames (paper, section on preprocessing); 1 = none
-    lead_s: float  # quiet context before the first touched frame
-    tail_s: float  # quiet context after the last touched frame
+    smooth_frames: int  # running average over so many frames (paper, section on preprocessing); 1 is none
+    lead_s: float  # quiet time before the first touched frame
+    tail_s: float  # quiet time after the last touched frame
     floor: float  # the segment's peak counts as at least so many times the sensor's noise
 
     def to_json(self) -> str:
@@ -62,7 +62,7 @@ class Window:
         return np.maximum(self.signed(segment), np.float32(0.0))
 
     def signed(self, segment: Segment) -> NDArray[np.float32]:
-        """As `apply`, but what lies below the baseline is negative: there something was let go."""
+        """As `apply`, but with negative values below the baseline, where something was let go."""
         start, end = self.span(segment)
         frames, times = segment.frames[start:end].astype(np.float64), segment.times[start:end]
         frames = self._regrid(frames, segment)
@@ -73,16 +73,16 @@ class Window:
         return np.maximum(frames / peak, -DEEPEST).astype(np.float32)
 
     def span(self, segment: Segment) -> tuple[int, int]:
-        """Which frames are taken in: from `lead_s` before the first touched one to `tail_s` after the last."""
+        """The indices [start, end) of its frames: from `lead_s` before the onset to `tail_s` after the offset."""
         slack = SLACK / self.rate_hz
         start = int(np.searchsorted(segment.times, segment.onset - self.lead_s - slack))
         return start, int(np.searchsorted(segment.times, segment.offset + self.tail_s + slack))
 
     def _regrid(self, frames: NDArray[np.float64], segment: Segment) -> NDArray[np.float64]:
-        """Area average (or bilinear, where the sensor is coarser) of a square around the touched place.
+        """The model's grid of a square around the touched place: area average, or bilinear if the sensor is coarser.
 
-        A long sensor is not squeezed: directions and circles keep their shape. The square is as wide as the
-        sensor's shorter side, or as long as the movement where that is longer.
+        A square keeps the shape of directions and circles on a long sensor. Its side is the sensor's shorter side, or
+        the length of the movement if that is longer.
         """
         _, rows, columns = frames.shape
         if (rows, columns) == (self.rows, self.columns):
@@ -104,9 +104,9 @@ class Window:
         return np.asarray(vertical @ frames @ horizontal.T)
 
     def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
-        """To `rate_hz` by time stamps: averaged where the sensor is faster, interpolated where it is slower.
+        """Frames at `rate_hz`, by time stamps: averaged if the sensor is faster, interpolated if it is slower.
 
-        `usual` is the sensor's own step in seconds, of all frames that are at hand: a tap alone has too few.
+        `usual` is the sensor's interval in seconds, of all frames of the segment, since those of a tap are too few.
         """
         if len(times) < 2:
             return frames
@@ -121,7 +121,7 @@ class Window:
             grid = np.arange(at[-1] + 1)
             out = _interpolate(grid.astype(float), at.astype(float), flat)
         else:
-            # Half a step beyond the end there is nothing left to average: rounding must not decide whether that counts.
+            # Half a step beyond the end nothing is left to average. Rounding must not decide whether that frame counts.
             whole = max(math.ceil((times[-1] - times[0]) * self.rate_hz - 0.5 - 1e-6), 0)
             grid = np.arange(whole + 1) * step + times[0]
             if usual > step:
@@ -132,7 +132,7 @@ class Window:
 
 
 def _resize(size: int, start: float, side: float, cells: int) -> NDArray[np.float64]:
-    """(cells, size) weights that bring `side` taxels from `start` on to `cells`; what lies outside counts as 0."""
+    """(cells, size) weights from `side` taxels, from `start` on, to `cells`; what lies outside the grid counts as 0."""
     width = side / cells
     taxel = np.arange(size)
     if width >= 1.0:
@@ -147,7 +147,7 @@ def _resize(size: int, start: float, side: float, cells: int) -> NDArray[np.floa
 def _interpolate(
     grid: NDArray[np.float64], times: NDArray[np.float64], flat: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Linear in time, (T, N) -> (len(grid), N); constant beyond the ends."""
+    """Linear interpolation in time, (T, N) -> (len(grid), N); constant beyond the ends."""
     right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
     share = np.clip((grid - times[right - 1]) / (times[right] - times[right - 1]), 0.0, 1.0)[:, None]
     return np.asarray(flat[right - 1] * (1 - share) + flat[right] * share)
@@ -169,7 +169,7 @@ def _box_mean(
 
 
 def running_mean(frames: NDArray[np.float64], length: int) -> NDArray[np.float64]:
-    """Mean over `length` frames centred on each; fewer at the ends. Windows are short: no running sums."""
+    """The mean of (T, ...) frames over `length` of them around each, over fewer at the ends."""
     before, after = length // 2, (length - 1) // 2
     n = len(frames)
     return np.stack([frames[max(0, k - before) : min(n, k + after + 1)].mean(axis=0) for k in range(n)])

@@ -1,4 +1,4 @@
-"""What is known of a sensor: at a moment, for status, metrics and whoever looks at it; and its jitter over time."""
+"""Readings: the state of a sensor for status, metrics and views; and its vitals, such as jitter, over time."""
 
 import math
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.quantiles import median
 
-# From good to bad.
+# The states of a sensor, from good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
-SHORT_S = 5.0  # a stretch of frames between two silences that is shorter may hold a few gestures alone
-STRETCHES = 3  # short stretches in a row after which a sensor is said to send only while it is touched
-FAULTY = 0.25  # share of the taxels: where so many are bad, what is bridged between them is guesswork
-LOUD = 10.0  # times the least noise that the sensor has had; from there on touches are missed
+SHORT_S = 5.0  # a shorter stretch of frames between two silences may hold only a few gestures
+STRETCHES = 3  # after so many short stretches in a row a sensor is said to send only while it is touched
+FAULTY = 0.25  # of the taxels: if more are bad, what is bridged between them is guesswork
+LOUD = 10.0  # times the least noise that the sensor has had: with as much noise, touches are missed
 WEIGHT = 1 / 16  # weight of the newest interval in the jitter (RFC 3550, 6.4.1)
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One sensor at a moment; all but the state and the grid are 0 or None where it was never heard.
+    """One sensor at a moment; if it was never heard, all but state, grid and gate are 0 or None.
 
     `state`: "no_data" (in the configuration, never heard), "starting", "ok", "degraded" (`reason` says why), "faulty"
     (too many taxels are bad), "intermittent" (it falls silent between touches), "inverted" (its counts fall when it is
@@ -33,7 +33,7 @@ class Reading:
 
     state: str
     grid: tuple[int, int]  # as it is sent
-    interval_s: float = 0.0  # from frame to frame, as they came
+    interval_s: float = 0.0  # from frame to frame as they came; 0 before it is known
     jitter_s: float = 0.0
     bad_taxels: int = 0
     noise: float = 0.0  # counts
@@ -42,23 +42,23 @@ class Reading:
     heard: float = 0.0  # s, on the hub's clock
     lost: int = 0  # frames that went missing
     lost_at: float | None = None  # s, on the hub's clock: when the last of them went missing
-    exchanged: bool = False  # touches look like a finger's with rows and columns the other way round
+    exchanged: bool = False  # whether contacts look like a finger only with rows and columns exchanged
     touched: bool = False
     contact: int | None = None  # id of the contact that was not released yet
     sequence: int = 0  # of its last gesture
-    segments: int = 0  # so far; the last one's id
+    segments: int = 0  # number of segments so far, which is the id of the last one
     first: NDArray[np.float64] | None = None  # (N,) counts: the first baseline that was learned
     baseline: NDArray[np.float64] | None = None  # (N,) counts: the baseline now
     reason: str = ""  # of "starting" and "degraded", in a sentence: what is wrong, or what the sensor waits for
 
     @property
     def rate_hz(self) -> float:
-        """Frames a second; 0 before it is known, and where the sensor is silent."""
+        """Frames a second; 0 before the rate is known, and while the sensor is silent."""
         return 1.0 / self.interval_s if self.interval_s > 0 and self.state not in SILENT else 0.0
 
     @property
     def drift(self) -> float:
-        """The median taxel's way from the first baseline, in units of noise."""
+        """The median of the taxels' distances from the first baseline, in units of noise."""
         if self.first is None or self.baseline is None or self.first.shape != self.baseline.shape:
             return 0.0
         return float(median(np.abs(self.baseline - self.first))) / max(self.noise, SMALLEST)
@@ -73,8 +73,8 @@ class Vitals:
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._quietest = np.inf  # counts: the least noise so far
         self.last: float | None = None  # s, when frames came last
-        # Of the frames that arrived at `last`: the jitter before them, the pause before them in s (infinite where it is
-        # unknown), and how many they are so far.
+        # Of the frames that arrived at `last`: the jitter before them, the pause before them in s (infinite if not
+        # known), and how many they are so far.
         self.together = 0.0, math.inf, 0
         self._began = 0.0  # s, the first frame after the last silence
         self.stretches = 0  # stretches in a row that were shorter than SHORT_S
@@ -85,7 +85,7 @@ class Vitals:
         return self.stretches >= STRETCHES and (self.last is None or self.last - self._began < SHORT_S)
 
     def arrived(self, now: float, frames: int, *, missed: bool) -> None:
-        """`frames` came together at `now` s. Interarrival jitter as RTP has it.
+        """Take note of `frames` that came together at `now` s, and update the jitter as RTP does (RFC 3550, 6.4.1).
 
         `missed`: this machine may have had no room for frames before these. Then the silence before them need not be
         the sensor's own, and short stretches are counted anew.
@@ -103,7 +103,7 @@ class Vitals:
         self.last = now
 
     def review(self, front_end: FrontEnd) -> None:
-        """Keep the first baseline, the least noise and the interval. Beside the way of a frame, with each tick."""
+        """Keep the first baseline, the least noise and the interval; called with each tick, not with each frame."""
         self.interval_s = front_end.pace.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
@@ -121,7 +121,7 @@ class Vitals:
         self.first, self._quietest = None, np.inf
 
     def condition(self, front_end: FrontEnd, *, inverted: bool) -> tuple[str, str]:
-        """The state of a sensor that is there, and where it is "starting" or "degraded" why: see `Reading`."""
+        """The state of a sensor that is not silent, and the reason if it is "starting" or "degraded"; see `Reading`."""
         conditioner, phase = front_end.conditioner, front_end.segmenter.phase
         if not front_end.ready or conditioner.idle.doubtful:
             return "starting", "it is being learned, and waits for a second in which nothing moves on it"
@@ -142,10 +142,11 @@ class Vitals:
 
 
 def view_of(front_end: FrontEnd, *, raw: bool) -> dict[str, Any] | None:
-    """The last frame and what the segmenter goes by, as JSON values; None before the first frame.
+    """The last frame and what the segmenter makes of it, as JSON values; None before the first frame.
 
-    Grids are row by row, as mounted but for `raw`; `values` are counts above the baseline with bad taxels bridged, None
-    before it is learned; activity is in noise units, and the centroid a row and a column, None where nobody touches.
+    Grids are row by row and as mounted, but `raw` is as sent. `values` are counts above the baseline with bad taxels
+    bridged, None before the baseline is learned. Activity is in noise units. The centroid is a row and a column, None
+    if nobody touches the sensor.
     """
     shown, look, t = front_end.last_sent, front_end.look, front_end.pace.last
     if shown is None or t is None:
