@@ -1,9 +1,9 @@
-"""Calm sensors as rows of arrays: the idle frames of all of them that wait together are taken together.
+"""Banks: calm sensors as rows of arrays, whose idle frames are processed together if they wait together.
 
-Nearly all frames of many sensors are idle, and a call of numpy costs more than the 81 numbers that it is for. So what
-is known of a sensor that nobody touches moves into a row of a bank, and moves back into the sensor's own objects before
-anything else than an idle frame in its turn is looked at. A bank does with such a frame what `Sensor.receive` does, to
-the last bit: `matmul` of a stack of grids gives what `dot` gives of each, and exponentials are `math`'s.
+Nearly all frames of many sensors are idle, and a call of numpy costs more than the work on 81 numbers. So what is
+known of a sensor that nobody touches moves into a row of a bank. It moves back into the sensor's own objects before
+anything but an idle frame in its turn is processed. A bank does with an idle frame what `Sensor.receive` does, to the
+last bit: `matmul` of a stack of grids gives what `dot` gives for each, and exponentials are those of `math`.
 """
 
 import math
@@ -45,10 +45,10 @@ from gestured.core.wire import Block
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEW = 6  # frames from which on taking them together costs less than one by one
+FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
-RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # frames of which times are kept, at least; a multiple of any depth
-# The numbers that are known of each sensor, by name; `Bank.enter` says where each of them is kept otherwise.
+RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
+# The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for.
 NAMES = (
     "last", "arrived", "tag", "counter", "interval", "jitter",
     "glance", "learned", "quieter", "lively", "reviewed", "step", "level",
@@ -56,7 +56,7 @@ NAMES = (
     "expected", "before", "pause", "came",
 )  # fmt: skip
 KNOWN = np.dtype([(name, np.float64) for name in NAMES])
-COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # of each taxel: `Idle`, `Conditioner`; the last frame as it was sent
+COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # tables by taxel: of `Idle`, `Conditioner`, and the last frame sent
 
 
 class Banks:
@@ -64,21 +64,21 @@ class Banks:
 
     def __init__(self) -> None:
         self._banks: dict[tuple[int, ...], Bank] = {}
-        self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: in which of them it is
+        self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: the kind of its bank
         self.doubted: set[str] = set()  # sensors, in banks or not, whose next frame may come after lost ones
 
     def enter(self, sensor: Sensor) -> None:
         """Move what is known of a sensor into a bank, if it is calm and its last frame came in its turn."""
         front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
-        front.calm = _calm(front)  # until its next frame
+        front.calm = _calm(front)  # this holds until its next frame
         if not sensor.calm:
             return
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
         arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.source_heard}
         if stamper.by_tag and stamper.tag is None:
-            return  # a bank could take none of its frames, and each would cost the way in and out
+            return  # a bank could take no frame without a time tag, and each would cost the way in and out
         if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
-            frames = min(max(LEAD_S / front.pace.interval_s, 1.0), LEAD_FRAMES)  # slow sensors keep one, too
+            frames = min(max(LEAD_S / front.pace.interval_s, 1.0), LEAD_FRAMES)  # even a slow sensor keeps one
             kind = (*front.kind, stamper.by_tag, 2 << math.ceil(math.log2(frames)))
             bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, *kind[-2:]))
             bank.enter(sensor)
@@ -93,7 +93,7 @@ class Banks:
             self._banks[kind].leave(sensor.name)
 
     def show(self) -> None:
-        """Put what readings tell, and when sensors were heard, into their objects; they stay where they are."""
+        """Copy what readings tell, and when sensors were heard, into their objects; they stay in their banks."""
         for bank in self._banks.values():
             bank.show()
 
@@ -105,12 +105,12 @@ class Banks:
     def take(
         self, blocks: Sequence[Block], sources: Sequence[Source], others: set[str], now: float, facts: list[Fact]
     ) -> dict[int, tuple[Block, int]]:
-        """Take the idle frames of sensors that are in banks; what is left, by packet: its block and place in it.
+        """Take the idle frames of sensors that are in banks; by packet, the block and the place of each that is left.
 
         `sources` are those of all packets. `others`: sensors of other packets, which must not be overtaken.
         """
         left: dict[int, tuple[Block, int]] = {}
-        names, arrived = set[str](), dict[int, list[str]]()  # by how many frames were lost just before
+        names, arrived = set[str](), dict[int, list[str]]()  # `arrived`: sensors by how many frames were lost before
         for block in blocks:
             others = others.union(names.intersection(block.sensors))
             names.update(block.sensors)
@@ -122,7 +122,7 @@ class Banks:
                         for n, before in zip(taken, lost, strict=True):
                             arrived.setdefault(before, []).append(block.sensors[n])
                         waits[taken] = False
-                except Exception as error:  # a bug: what was not taken until then is taken one by one
+                except Exception as error:  # after a bug, the frames that are left are taken one by one
                     facts.append(Fault(None, error))
             left |= {block.packets[n]: (block, n) for n in waits.nonzero()[0].tolist()}
         facts += [Arrived(tuple(each), 1, lost, 0, 0, 0) for lost, each in arrived.items()]
@@ -130,25 +130,25 @@ class Banks:
 
 
 class Bank:
-    """Calm sensors of one kind: of one grid, mounting and clock, and of about one rate."""
+    """Calm sensors of one kind: with the same grid, mounting and clock, and about the same rate."""
 
     def __init__(self, front: FrontEnd, by_tag: int, depth: int) -> None:
-        """For sensors whose front ends are like this one, of whose last frames `depth` can be kept."""
-        self._by_tag, self._least_s = by_tag, max(LEAD_S / depth, Stamper.MIN_STEP_S)  # between two frames
-        self._front, self._activity = front, Activity(front.rows, front.columns)  # for what is the same of all
+        """A bank for sensors with front ends like this one, which keeps the last `depth` frames of each."""
+        self._by_tag, self._least_s = by_tag, max(LEAD_S / depth, Stamper.MIN_STEP_S)  # least interval between frames
+        self._front, self._activity = front, Activity(front.rows, front.columns)  # for what all sensors share
         taxels = front.rows * front.columns
         self._sensors: dict[str, Sensor] = {}
         self._rows: dict[str, int] = {}
         self._owners: dict[str, Source] = {}
-        self._recover: dict[int, AfterEffect] = {}  # by row: what a contact has left on a sensor
+        self._recover: dict[int, AfterEffect] = {}  # by row of a sensor that recovers from a contact
         self._free = list(range(FIRST_ROWS))
         self._known = np.zeros(FIRST_ROWS, KNOWN)
         self._taxels = [np.zeros((FIRST_ROWS, taxels)) for _ in range(5)]
-        self._above = np.zeros((FIRST_ROWS, depth, taxels))  # of the last frames, of which the cutter keeps some
-        self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s of each: time, `Kept.new`, interval
+        self._above = np.zeros((FIRST_ROWS, depth, taxels))  # counts of the last frames, of which the cutter keeps some
+        self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s, by frame: its time, `Kept.new`, the interval
 
     def __len__(self) -> int:
-        """How many sensors are in it."""
+        """How many sensors are in the bank."""
         return len(self._rows)
 
     def enter(self, sensor: Sensor) -> None:
@@ -166,7 +166,7 @@ class Bank:
             math.nan if stamper.counter is None else stamper.counter,
             front.pace.interval_s, vitals.jitter_s,
             idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
-            activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # activity and number of frames taken here
+            activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # 0: activity, and frames taken here
             vitals.interval_s, *vitals.together,
         )  # fmt: skip
         assert front.last_sent is not None
@@ -219,10 +219,10 @@ class Bank:
         cutter.last_raw, cutter.new = raw.tobytes(), new
         front.look = Look(last, raw, above[-1], active, False, False, False)
         if front.rows != front.columns:
-            sensor.habits.see(front)  # it learns from the last idle frame before a contact
+            sensor.habits.see(front)  # `habits` compares contacts with the last idle frame
 
     def show(self) -> None:
-        """Put what readings tell, and when sensors were heard, into their objects."""
+        """Copy what readings tell, and when sensors were heard, into their objects."""
         rows = list(self._rows.values())
         known = self._known[["last", "arrived", "interval", "jitter", "level"]][rows].tolist()
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
@@ -234,15 +234,15 @@ class Bank:
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
 
     def review(self) -> None:
-        """All sensors were reviewed: jitter is told by their intervals as they are now."""
+        """All sensors were reviewed: from now on jitter is computed with their present intervals."""
         self._known["expected"] = self._known["interval"]
 
     def take(
         self, block: Block, sources: Sequence[Source], others: set[str], doubted: set[str], now: float
     ) -> Iterator[tuple[list[int], list[int]]]:
-        """Take those frames of a block that are idle.
+        """Take the idle frames of a block, at most one of each sensor at a time.
 
-        Gives of those that are taken together at a time their places in it, and how many frames were lost just before.
+        Yields for each time the places in the block of the frames that were taken, and how many were lost before each.
         """
         if block.values.shape[1:] != self._front.grid_sent:
             return
@@ -253,9 +253,9 @@ class Bank:
         rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
         frames = np.bincount(rows[mine], minlength=len(self._known))
         if not self._by_tag:
-            mine &= frames[rows] == 1  # several share their time
+            mine &= frames[rows] == 1  # several frames of one sensor share their time of arrival
         elif block.tags is not None and (several := (mine & (frames[rows] > 1)).nonzero()[0]).size:
-            # A sensor whose clock is coarse gives several of its frames one time; it spaces these by itself.
+            # A sensor with a coarse clock gives several frames one time tag; its own stamper spaces these.
             order = several[np.lexsort((block.tags[several], rows[several]))]
             row, tag = rows[order], block.tags[order]
             if (same := (row[1:] == row[:-1]) & (tag[1:] == tag[:-1])).any():
@@ -263,7 +263,7 @@ class Bank:
         left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
         while len(left):
             first.fill(-1)
-            first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
+            first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since numpy keeps what is assigned last
             turn = first[first >= 0]
             doubts = np.array([block.sensors[n] in doubted for n in turn.tolist()]) if doubted else None
             lost = self._take(block, turn, rows[turn], doubts, now)
@@ -284,10 +284,10 @@ class Bank:
     def _take(
         self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], doubts: Mask | None, now: float
     ) -> NDArray[np.intp]:
-        """Take a frame of each of n rows where it is idle and no earlier one; (n,) how many were lost just before it.
+        """Take one frame of each of n rows, if it is idle and in its turn; (n,) how many were lost just before each.
 
-        That is -1 where it was not taken. What was lost of an idle sensor changes nothing but counts and intervals.
-        `doubts`: (n,) before which of them others may have been lost on this machine; None before none.
+        That number is -1 for a frame that was not taken. Frames that were lost while a sensor was idle change only its
+        counts and intervals. `doubts`: (n,) whether this machine may have lost frames just before; None for no frame.
         """
         front, known = self._front, _numbers(self._known).take(rows, axis=0)
         (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
@@ -301,7 +301,7 @@ class Bank:
         tag[:], since, lost = tags, t - last, np.zeros(len(rows), np.intp)
         if block.counters is None:
             taken &= np.isnan(counter)
-            if doubts is not None:  # what fits into the pause is lost, see `Stamper.stamp`
+            if doubts is not None:  # as many frames as fit into the pause count as lost, see `Stamper.stamp`
                 lost[doubts] = np.maximum(np.rint(since / self._usual(rows, count))[doubts] - 1, 0)
             steps = np.ones(len(rows))
         else:  # see `Stamper._count`
@@ -316,13 +316,14 @@ class Bank:
         if glanced.size:
             changes = raw[glanced] - self._taxels[COMPARED][rows[glanced]]
             loud = (np.abs(changes) * QUIETER >= learned[glanced, np.newaxis]).sum(axis=1)
-            clear = (loud > changes.shape[1] // 2) & (learned[glanced] > 0)  # so is the median of those that moved
+            # If most taxels moved that much, so did the median of those that moved, and `glances` is not needed.
+            clear = (loud > changes.shape[1] // 2) & (learned[glanced] > 0)
             quieter[glanced[clear]] = 0.0
             glance[glanced] = t[glanced] + GLANCE_S
             if not clear.all():
                 changes, less = changes[~clear], glanced[~clear]
                 quieter[less] += glances(changes, learned[less], lively[less], quieter[less])
-                taken &= quieter < GLANCES  # else the sensor was learned from what was no idle one
+                taken &= quieter < GLANCES  # else no idle sensor was learned, see `Idle.mistaken`
         counts = self._taxels[COUNTS].take(rows, axis=0)
         above = raw - counts
         active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
@@ -339,10 +340,10 @@ class Bank:
             sigma = np.maximum(sigma, step[due, np.newaxis] / 2)
             level[due], reviewed[due] = median(sigma.T), t[due]
             scale[due] = np.minimum(np.maximum(usual[due] / self._activity.typical, 1.0), USUAL_AT_MOST)
-            taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else some taxels are bad
+            taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else a taxel is bad
             weight = weigh(sigma, level[due, np.newaxis], scale[due, np.newaxis])
 
-        first = arrived != now  # of those that came together
+        first = arrived != now  # whether it is the first of the sensor's frames that arrived at `now`
         for column, begun in ((before, jitter), (pause, now - arrived), (came, 0.0)):
             np.copyto(column, begun, where=first)
         came += 1
@@ -352,7 +353,7 @@ class Bank:
         news = (_bytes(sent) != _bytes(self._taxels[SENT].take(rows, axis=0))) | (lively == 0)
         np.copyto(new, t, where=news)
         last[:], arrived[:] = t, now
-        # From here on sensors change: all of what was found above, of those whose frames are taken.
+        # Nothing of a sensor has changed so far. From here on, what was found is stored for the frames that are taken.
         if glanced.size:
             glanced = glanced[taken[glanced]]
             self._taxels[COMPARED][rows[glanced]] = raw[glanced]
@@ -371,7 +372,7 @@ class Bank:
         return lost
 
     def _usual(self, rows: NDArray[np.intp], count: Array) -> Array:
-        """(n,) s, the usual interval of n rows, of which so many frames were taken here; see `Stamper`."""
+        """(n,) s, the usual interval of n rows, of each of which `count` frames were taken here; see `Stamper`."""
         slots = (count.astype(np.intp)[:, np.newaxis] - 1 - np.arange(Stamper.RECENT)) % self._when.shape[1]
         steps = self._when[rows[:, np.newaxis], slots, 2]
         steps = np.sort(np.where(steps > 0, steps, math.inf), axis=1)
@@ -379,7 +380,7 @@ class Bank:
         return np.where(known > 0, steps[np.arange(len(rows)), known // 2], Stamper.PERIOD_S)
 
     def _taus(self, rows: NDArray[np.intp], t: Array) -> float | Array:
-        """With which time constants the baselines follow until (n,) times `t`, in s; one number where all have it."""
+        """The time constants in s with which the baselines follow until (n,) times `t`; one number if all are alike."""
         if not self._recover:
             return BASELINE_TAU_S
         taus = np.zeros(len(rows)) + BASELINE_TAU_S
@@ -397,14 +398,14 @@ class Bank:
 
 
 def _calm(front: FrontEnd) -> bool:
-    """Whether a bank can take a front end's next frame: it is calm, or would be but for a contact's after-effect."""
+    """Whether a front end is calm, or would be without a contact's after-effect, so that a bank can take its frames."""
     look = front.look
     known = look is not None and not look.sunken and front.conditioner.sound and front.pace.interval_s > 0
     return front.calm or (known and front.segmenter.phase is IDLE)
 
 
 def _numbers(known: NDArray[Any]) -> Array:
-    """(n,) what is known of n sensors -> (n, len(NAMES)), the same memory, of which rows are copied much faster."""
+    """(n,) what is known of n sensors -> (n, len(NAMES)), a view whose rows are copied much faster."""
     return known.view(np.float64).reshape(len(known), -1)
 
 
@@ -414,12 +415,12 @@ def _twice(table: NDArray[Any]) -> NDArray[Any]:
 
 
 def _bytes(rows: Array) -> NDArray[np.void]:
-    """(n, N) -> (n,), each row as its bytes, which are compared at once."""
+    """(n, N) -> (n,), the bytes of each row, which numpy compares as one value."""
     return rows.view(f"V{rows.itemsize * rows.shape[1]}")[:, 0]
 
 
 def _shares(ago: Array) -> Array:
-    """(n,) shares of a difference that a follower takes up in (n,) times `-ago`, in units of its time constant."""
+    """(n,) shares of a difference by which a filter moves in (n,) times `-ago`, in units of its time constant."""
     times = ago.tolist()
     shares = {time: -math.expm1(time) for time in set(times)}  # sensors that are read together share their times
     return np.array([shares[time] for time in times])

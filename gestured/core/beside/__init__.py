@@ -1,1 +1,1 @@
-"""What looks on: it sees frames and contacts, and nothing of it returns into an answer."""
+"""Observers: they see frames and contacts, and no answer depends on them."""

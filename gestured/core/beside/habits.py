@@ -1,4 +1,4 @@
-"""What the frames of one sensor say of how it was connected, beside what they say of gestures."""
+"""Habits: what the contacts of one sensor say of how it was connected, such as inverted counts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +8,11 @@ from gestured.core.front_end import Cut, Found, FrontEnd, Opened, Void
 Array = NDArray[np.float64]
 Counts = NDArray[np.generic]
 
-ENOUGH = 3  # contacts that must speak for it before it is said
-MOSTLY = 3  # times as many contacts must speak for it as against it
+ENOUGH = 3  # the fewest contacts that must speak for a fault before it is reported
+MOSTLY = 3  # so many times more contacts must speak for a fault than against it
 PAUSE_S = 0.3  # counts that fall below the baseline again after so long belong to another contact
-ALIKE = 0.3  # correlation from which neighbours are alike: a fingertip covers more than one taxel
-CLEARLY = 0.1  # how much higher the correlation must be with rows and columns exchanged than as they are
+ALIKE = 0.3  # neighbours with a higher correlation are alike, since a fingertip covers more than one taxel
+CLEARLY = 0.1  # the correlation must be so much higher with rows and columns exchanged than as they are
 
 
 class Habits:
@@ -23,22 +23,22 @@ class Habits:
         self.clear()
 
     def clear(self) -> None:
-        """Nothing was seen: the sensor is learned anew."""
+        """Forget all contacts: the sensor is learned anew."""
         self.falls = self.rises = 0  # contacts in which counts fell below the baseline, and in which they rose
         self.exchanges = self.fits = 0  # contacts that look like one finger with R and C exchanged, and as they are
-        self._fell = -np.inf  # s, the last frame that lay below the baseline
+        self._fell = -np.inf  # s, the last frame whose counts fell below the baseline
         self._falling = False  # whether a contact in which counts fell is not over
         self._idle: Counts | None = None  # (R, C) the last frame without a contact
         self._strongest: tuple[float, Counts | None] = 0.0, None  # the contact's strongest frame: activity, and (R, C)
 
     @property
     def falling(self) -> bool:
-        """Whether idle frames are to end a contact in which counts fell. Those of a square grid say nothing of that."""
+        """Whether idle frames are needed to end a contact in which counts fell; not those of a square grid."""
         return self._falling and self._rows != self._columns
 
     @property
     def inverted(self) -> bool:
-        """Whether counts fall where the sensor is touched."""
+        """Whether counts fall when the sensor is touched."""
         return self.falls >= ENOUGH and self.falls >= MOSTLY * self.rises
 
     @property
@@ -47,7 +47,7 @@ class Habits:
         return self.exchanges >= ENOUGH and self.exchanges >= MOSTLY * self.fits
 
     def hear(self, found: Found) -> None:
-        """Hear what a front end has found of a contact."""
+        """Take note of what a front end has found of a contact."""
         if isinstance(found, Opened):
             self.rises += 1
             self._strongest, self._falling = (0.0, None), False
@@ -55,7 +55,7 @@ class Habits:
             self._compare()
 
     def see(self, front_end: FrontEnd) -> None:
-        """See the last frame that a front end has taken. Where R equals C, only `Look.burst` says something."""
+        """Take note of the last frame of a front end. On a square grid only a frame with `Look.burst` matters."""
         shown, look = front_end.last_sent, front_end.look
         if shown is None or look is None:
             return
@@ -71,7 +71,7 @@ class Habits:
             self._idle = shown
 
     def paused(self, t: float) -> bool:
-        """Whether no contact in which counts fell goes on at `t` s; one that is over is compared."""
+        """Whether no contact in which counts fell goes on at `t` s. If such a contact is over now, it is compared."""
         if t - self._fell <= PAUSE_S:
             return False
         if self._falling:
@@ -80,12 +80,12 @@ class Habits:
         return True
 
     def _press(self, values: Counts, activity: float) -> None:
-        """A frame (R, C) of a contact, as it was sent."""
+        """Take a frame of a contact: (R, C) counts as sent."""
         if activity > self._strongest[0]:
             self._strongest = activity, values
 
     def _compare(self) -> None:
-        """A contact is over: its strongest frame is compared with an idle one."""
+        """Compare the strongest frame of a contact that is over with an idle frame."""
         pressed = self._strongest[1]
         if self._rows == self._columns or self._idle is None or pressed is None:
             return
@@ -96,7 +96,7 @@ class Habits:
 
 
 def neighbours_alike(change: Array, columns: int) -> float:
-    """How alike vertical neighbours are in (N,) taxels, were there so many columns: their correlation, -1 to 1."""
+    """The correlation, -1 to 1, of vertical neighbours in an (N,) frame's `change`, if it had so many `columns`."""
     change = np.where(np.abs(change) >= ALIKE * np.abs(change).max(), change, 0.0)  # without the idle sensor's noise
     total = float(change @ change)
     return float(change[:-columns] @ change[columns:]) / total if total > 0 else 0.0

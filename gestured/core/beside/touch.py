@@ -1,9 +1,9 @@
-"""The fingers of the contact that goes on: where each is, from frame to frame, for whoever asks to follow them.
+"""The fingers of the open contact: touch events that say where each finger is, from frame to frame, if asked for.
 
-A touch event is no answer, and nothing that decides an answer reads what is written here. While a contact may become a
-gesture, all that presses is followed. Once it was given up (`held`), a finger that has stood still for a second is told
-to be up with the reason `learned`: from then on it is part of what lies there, and what moves beside it is followed. A
-finger that was learned and moves on comes down again.
+A touch event is no answer, and no answer depends on it. While a contact may become a gesture, all that presses is
+followed. After it was given up (`held`), a finger that has stood still for a second gets an `up` with the reason
+`learned`: from then on it is part of what lies there, and only what moves beside it is followed. If that finger moves
+on, it comes down again.
 """
 
 import math
@@ -24,23 +24,23 @@ from gestured.core.where import FINE, Zone, fractions, zone_at
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-EACH_S = 0.0166  # from one move of a finger to the next: 60 a second, a little less than 1/60 because times are rounded
+EACH_S = 0.0166  # the time between a finger's moves, 60 a second: a little less than 1/60 s because times are rounded
 GONE_S = 0.1  # a finger that was not seen for so long has left, as in `Timing.release_s`; at 15 Hz two frames
-PART_S = 0.5  # s, the length of one part of the time in which a taxel must not have changed
-PARTS = 2  # parts of PART_S: a taxel that has not changed for a second lies still
-CHANGE = 0.35  # of a taxel's level: a taxel that changes by less trembles, and lies still all the same
-RESTLESS = 8.0  # noise units: a taxel that changes by less than that lies still, too
-LEFT = 0.9  # of the level at which a finger lay: where its taxel shows less, the finger has left that place
+PART_S = 0.5  # the length of one of the PARTS in which the lowest and highest counts of taxels are kept
+PARTS = 2  # a taxel that has not changed for so many parts, which is a second, lies still
+CHANGE = 0.35  # of a taxel's level: a taxel that changes by less only trembles, and counts as lying still
+RESTLESS = 8.0  # noise units: a taxel that changes by less counts as lying still
+LEFT = 0.9  # of the level at which a finger lay: if its taxel shows less, the finger has left that place
 BESIDE = 3.0  # taxel pitches: a touch that begins so near to a place that a finger has left is that finger
 
-# A touch event before it is told: one is made of each frame, and a frozen dataclass takes six times as long to make.
+# A touch event while it is made, one for each frame: a frozen dataclass takes six times as long to make.
 _Draft: Any = make_dataclass("_Draft", Touch.__slots__, slots=True)
 
 
 class Lying:
-    """What lies still on a sensor of so many rows and columns, and what moves beside it.
+    """What lies still on a sensor of R x C taxels, such as an arm or a finger that holds, and what moves beside it.
 
-    It begins at `t` s, when a contact was given up: an arm, or a finger that holds.
+    It begins at `t` s, when a contact was given up.
     """
 
     def __init__(self, t: float, shape: tuple[int, int]) -> None:
@@ -48,16 +48,16 @@ class Lying:
         self._image: Array = np.zeros(shape)  # counts of what lies still
         self._parts: deque[tuple[Array, Array]] = deque(maxlen=PARTS + 1)  # lowest and highest counts, latest last
         self._begun = t  # s, when the last part began
-        self._fingers: list[tuple[tuple[int, int], float]] = []  # those that lie there: strongest taxel, and its counts
+        self._fingers: list[tuple[tuple[int, int], float]] = []  # those that lie there: strongest taxel, its counts
 
     def moving(self, frame: Array, t: float, least: float) -> Array | None:
-        """What moves in (R, C) counts at `t` s, in counts; None where that is hardly more than `least`."""
+        """The counts of what moves in an (R, C) frame at `t` s; None if all are below `least`, or only tremble."""
         if not self._parts or t - self._begun >= PART_S:
             self._parts.append((frame, frame))
             self._begun = t
         low, high = self._parts[-1]
         self._parts[-1] = np.minimum(low, frame), np.maximum(high, frame)
-        self._image = np.minimum(self._image, frame)  # it may leave, or give way
+        self._image = np.minimum(self._image, frame)  # what lies there may leave, or give way
         moving = frame - self._image
         row, column = divmod(int(moving.argmax()), frame.shape[1])
         around = self._image[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].max()
@@ -71,7 +71,7 @@ class Lying:
         return moving
 
     def learn(self, fingers: list[Spot], frame: Array, noise: float) -> list[Spot]:
-        """Learn what has not changed for a second, unless a moving finger is near; returns the fingers among it."""
+        """Learn what has not changed for a second, unless a moving finger is near; returns the fingers learned."""
         if len(self._parts) <= PARTS:
             return []
         low = np.min([low for low, _ in self._parts], axis=0)
@@ -92,7 +92,7 @@ class Lying:
 
 
 def _taxels(spot: Spot) -> tuple[slice, slice]:
-    """A finger's place and the taxels beside it."""
+    """The taxels of a finger: the one at its place, and those beside it."""
     row, column = round(spot.row), round(spot.column)
     return slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2)
 
@@ -103,30 +103,30 @@ class Finger:
 
     spot: Spot
     t: float  # s
-    told: Touch | None = None  # what was told of it last
+    told: Touch | None = None  # the last event of this finger
 
 
 class Fingers:
-    """The fingers of one sensor's contact, and what is told of them."""
+    """The fingers of one sensor's open contact, and their touch events."""
 
     def __init__(self, sensor: str, zones: Mapping[str, Zone]) -> None:
         self._sensor, self.zones = sensor, zones
-        self.asked = False  # whether somebody follows them
+        self.asked = False  # whether somebody asks for touch events
         self.begin(0)
 
     def begin(self, number: int) -> None:
-        """Another contact begins; `number` is its id."""
+        """Begin another contact; `number` is its id."""
         self._id, self._count = number, 0
         self._fingers: list[Finger] = []
         self._looked = -math.inf  # s, the last frame that was looked at
         self._lying: Lying | None = None  # since the contact was given up
         self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
         self._fine = (
-            1.0  # parts of a count to which pressure is told, a power of ten: a hundredth of the noise, or less
+            1.0  # parts of a count to which pressure is rounded: a power of ten, to a hundredth of the noise or finer
         )
 
     def end(self, baseline: Array | None = None) -> list[Touch]:
-        """The contact is over: `up` for each finger that was told of. The (N,) `baseline` shows which were learned."""
+        """End the contact: an `up` for each finger with an event. The new (N,) `baseline` shows which were learned."""
         fingers, self._fingers = [one for one in self._fingers if one.told], []
         if baseline is None or self._baseline is None or baseline is self._baseline:
             return [self._tell(one, "up") for one in fingers]
@@ -135,7 +135,7 @@ class Fingers:
         return [self._tell(one, "up", "learned" if lies else None) for one, lies in zip(fingers, lie, strict=True)]
 
     def see(self, front_end: FrontEnd) -> list[Touch]:
-        """The last frame of a front end, in which a contact goes on."""
+        """The touch events of a front end's last frame, in which a contact goes on."""
         look, segmenter = front_end.look, front_end.segmenter
         if look is None or look.shifted:
             return []
@@ -164,7 +164,7 @@ class Fingers:
         return told
 
     def _follow(self, found: list[Spot], t: float) -> list[Touch]:
-        """Which finger is which, and what became of each."""
+        """The events of the fingers, after each spot that was `found` at `t` s is given to its finger."""
         if len(found) == 1 == len(self._fingers):  # nearly all frames
             one = self._fingers[0]
             one.spot, one.t = found[0], t
@@ -182,12 +182,12 @@ class Fingers:
         for spot in found:
             new = Finger(spot, t)
             self._fingers.append(new)
-            if len(self._fingers) == 1:  # a second one may be a flaw of one frame
+            if len(self._fingers) == 1:  # a second finger may be a flaw of one frame, so it waits for another
                 told.append(self._tell(new))
         return told
 
     def _tell(self, one: Finger, phase: str = "move", reason: str | None = None) -> Touch:
-        """What is told of a finger now; at first that it is down."""
+        """The event of a finger now; its first one is `down`."""
         row, column, peak, area = one.spot
         x, y = fractions(*self._shape, row, column)
         if (last := one.told) is None:
@@ -204,7 +204,7 @@ class Fingers:
 
 
 def _paired(fingers: list[Finger], found: list[Spot]) -> list[tuple[Finger, Spot]]:
-    """The fingers with the spots that they most probably are now; at most two of each."""
+    """The pairs of fingers and spots that most probably belong together, of at most two of each."""
     if len(fingers) == 2 and len(found) == 2:
         straight = _apart(fingers[0].spot, found[0]) + _apart(fingers[1].spot, found[1])
         crossed = _apart(fingers[0].spot, found[1]) + _apart(fingers[1].spot, found[0])
