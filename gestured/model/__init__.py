@@ -1,1 +1,1 @@
-"""Model files: looked at, opened, run, and one above the other as a ladder."""
+"""Models: .onnx files as classifiers, checked, opened and run, one by one or as a ladder of fallbacks."""

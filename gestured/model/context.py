@@ -1,7 +1,7 @@
-"""What surrounds a contact, as numbers for a model: the input `context` of its graph.
+"""The context of a contact, as numbers for a model: the input `context` of its graph.
 
-What went on before the contact comes from the sensor's past (`core.frames.Before`); the rest are measures of the
-segment that its window does not hold, since a window is scaled by its own peak and cut off at the baseline.
+Some values come from the sensor's past (`core.frames.Before`). The others are measures of the segment that its window
+does not hold, since a window is scaled by its own peak and cut off at the baseline.
 """
 
 import math
@@ -14,18 +14,18 @@ from gestured.core.frames import UNDISTURBED, Before, Segment
 from gestured.core.window import Window
 
 NAMES = (
-    "quiet", "recent", "length", "covered", "rest",  # before the contact
-    "strength", "lowest", "below", "first", "last",  # of the segment
+    "quiet", "recent", "length", "covered", "rest",  # from before the contact
+    "strength", "lowest", "below", "first", "last",  # measures of the segment
 )  # fmt: skip
-PAST = 5  # of these come from what went on before the contact
-BELOW = 0.15  # of the peak: so far below the baseline a taxel was let go
-DEEPEST = 3.0  # times the peak: deeper than that says no more
-STRONGEST = 2000.0  # times the noise, and longest rests in s; more says no more
-LONGEST_S = 60.0
+PAST = 5  # so many of the names, the first ones, are of values from before the contact
+BELOW = 0.15  # of the peak: a taxel so far below the baseline was let go
+DEEPEST = 3.0  # times the peak: taxels further below the baseline say nothing more
+STRONGEST = 2000.0  # times the noise: a stronger contact, or a heavier thing at rest, says nothing more
+LONGEST_S = 60.0  # a longer last contact says nothing more
 
 
 def past(before: Before) -> tuple[float, ...]:
-    """The values that come from what went on before a contact."""
+    """The first PAST values of `NAMES`, from what went on before a contact."""
     return (
         math.log(0.05 + max(before.quiet_s, 0.0)),
         math.log1p(before.recent),
@@ -35,22 +35,22 @@ def past(before: Before) -> tuple[float, ...]:
     )
 
 
-# Of a clear gesture on an undisturbed sensor: what a model is given of a window that comes alone.
+# The context of a clear gesture on an undisturbed sensor, which a model is given with a window that comes alone.
 CALM = np.array([*past(UNDISTURBED), 4.0, -0.05, 0.0, 0.05, 0.1], np.float32)
 
 
 def calm(batch: int, names: Sequence[str]) -> NDArray[np.float32]:
-    """(B, K) the context of a clear gesture on an undisturbed sensor, for `count` windows."""
+    """(B, K) the context of a clear gesture on an undisturbed sensor, for `batch` windows."""
     return np.tile(CALM[chosen(names)], (batch, 1))
 
 
 def chosen(names: Sequence[str]) -> list[int]:
-    """Which of `NAMES` these are; ValueError for another one."""
+    """The indices in `NAMES` of these names. Raises ValueError for a name that is not there."""
     return [NAMES.index(name) for name in names]
 
 
 def context(segment: Segment, signed: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
-    """(K,) the values of `NAMES` for a segment and its signed window (T, R, C)."""
+    """(K,) the values of `NAMES` for a segment and its (T, R, C) window, `signed` as `Window.signed` gives it."""
     start = window.span(segment)[0]
     first = max(int(np.searchsorted(segment.times, segment.onset)) - start, 0)
     touched = segment.frames[segment.first : segment.last + 1]

@@ -1,4 +1,4 @@
-"""The recogniser of one sensor in a process of one's own: what `gestured.open` gives."""
+"""The recogniser of one sensor in the caller's own process, which `gestured.open` returns."""
 
 import errno
 import logging
@@ -38,7 +38,7 @@ from gestured.model.ladder import (
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
-# What `open` takes, where nothing further on says it better.
+# By argument of `open`: its type, and in words what was expected, if no later check says it better.
 _TAKES: Mapping[str, tuple[Any, str]] = {
     "model": (str | os.PathLike, "a name or a path"), "own_gestures": (str | os.PathLike | None, "a path"),
     "rotate": (int | np.integer, "0, 90, 180 or 270"),
@@ -50,10 +50,10 @@ _TAKES: Mapping[str, tuple[Any, str]] = {
 
 
 class Embedded:
-    """One sensor's recogniser: frames in, the events out that the daemon gives for the same frames.
+    """The recogniser of one sensor: frames in, and out the events that the daemon gives for the same frames.
 
-    Times are seconds on any clock that only goes forward, from frame to frame, across `flush` and `reset` too. The
-    first second without a touch teaches it the idle sensor; until then there are no events.
+    Times are seconds on any clock that goes forward from frame to frame, also across `flush` and `reset`. From the
+    first second without a touch the recogniser learns the idle sensor; until then there are no events.
     """
 
     def __init__(self, sensor: Sensor, gestures: tuple[str, ...]) -> None:
@@ -61,18 +61,18 @@ class Embedded:
         self._sensor = sensor
         self._shape = sensor.front_end.grid_sent
         self._last = -math.inf  # s, the time of the last frame
-        self._closed: set[str] = set()  # gates
+        self._closed: set[str] = set()  # names of the closed gates
 
     def __reduce_ex__(self, _: object) -> NoReturn:
-        """Copies would share what is known of the sensor, and a model is of one process."""
+        """Refuse a copy, which would share what is known of the sensor; besides, a model belongs to one process."""
         raise TypeError("a recogniser cannot be copied or pickled: use gestured.open where another one is needed")
 
     def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
-        """Take the frame of `t` s, (R, C) counts as the sensor sends them; give what it decides.
+        """Take the frame of `t` s, (R, C) counts as the sensor sends them; return the events that it decides.
 
-        `touches` are the finger positions that the sensor knows, `lost` how many frames went missing just before.
-        A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a time
-        that is not after the last frame's, `values` that are no frame of this sensor's grid, a `lost` that is no count.
+        `touches` are the finger positions that the sensor knows, and `lost` is how many frames went missing just
+        before. A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a
+        time not after the last frame's, `values` that are no frame of this sensor's grid, or a `lost` that is no count.
         """
         seconds = _seconds(t)
         if not self._last < seconds < math.inf:
@@ -90,22 +90,22 @@ class Embedded:
 
     @property
     def due(self) -> float | None:
-        """When `wait` will have an answer unless a frame comes before, in s; None where nothing waits."""
+        """When `wait` will have an answer unless a frame comes before, in s; None if nothing waits."""
         return self._sensor.due
 
     def wait(self, t: float) -> list[Event]:
         """No frame has come until `t` s: answer a contact that is over.
 
-        Whoever does not call it gets the same answer with the next frame. Raises ValueError for a time before the
-        last frame's.
+        Without this call, the same answer comes with the next frame. Raises ValueError for a time before the last
+        frame's.
         """
         return events_of(self._sensor.wait(self._now(t)))
 
     def flush(self, t: float) -> list[Event]:
-        """The stream paused or ended at `t` s: decide what can be decided, cancel the rest.
+        """The stream paused or ended at `t` s: decide what can be decided, and cancel the rest.
 
-        A pause of more than a second needs none: the next frame notices it. Raises ValueError for a time before the
-        last frame's.
+        A pause of more than a second does not need this call, since the next frame notices it. Raises ValueError for a
+        time before the last frame's.
         """
         return events_of(self._sensor.flush(self._now(t)))
 
@@ -121,7 +121,7 @@ class Embedded:
         return self._gate(t, self._closed - {gate})
 
     def reset(self) -> list[Event]:
-        """The sensor restarted: cancel what is open, learn the idle sensor anew."""
+        """The sensor restarted: cancel the open contact, and learn the idle sensor anew."""
         return events_of(self._sensor.reset())
 
     def _gate(self, t: float, closed: set[str]) -> list[Event]:

@@ -15,23 +15,23 @@ from gestured.model.model import Model
 from gestured.model.own import Own, placed
 from gestured.model.prototypes import Prototype, Space
 
-SHORTEST_S = 0.15  # of an example; a shorter contact is a tap, whatever was meant
-FEWEST = 3  # touched frames of an example; fewer show no movement
+SHORTEST_S = 0.15  # the shortest example; a shorter contact is a tap, whatever was meant
+FEWEST = 3  # the fewest touched frames of an example; fewer show no movement
 
 
 class Examiner:
-    """A model that judges the examples of an enrolment: what speaks against one, in words, or None."""
+    """A judge of an enrolment's examples, by one model: it says in words what speaks against an example, or None."""
 
     def __init__(self, model: Model, space: Space, own: Own, in_use: Collection[str]) -> None:
         """`own` are the user's gestures so far, `in_use` the model's gestures that are in use."""
         self._model, self._space, self._own, self._in_use = model, space, own, in_use
 
     def example(self, segment: Segment) -> Example | None:
-        """A segment as it is kept; None for one that is too long, or not finite."""
+        """The example of a segment; None for a segment that is too long, or not finite."""
         return Example.of(segment, self._model.metadata.window)
 
     def same_as(self, example: Example) -> str | None:
-        """The gesture that an example would be taken for, and how surely, in words; None where there is none."""
+        """The gesture that an example would be taken for, and its confidence, in words; None if there is none."""
         taken = placed(self._model, self._space, example).taken
         if taken is not None and taken[0] in self._in_use:
             return f"{taken[0]} ({taken[1]:.2f})"
@@ -39,7 +39,7 @@ class Examiner:
         return None if match is None or match.confidence < NEAR else f"{match.name} ({match.confidence:.2f})"
 
     def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
-        """How near an example is to those that were kept, in words, where that is not near enough; else None."""
+        """The confidence that an example is the gesture of those kept, in words, if that is too low; else None."""
         near, *others = (placed(self._model, self._space, one).place for one in (example, *kept))
         confidence = Prototype.of(self._space, np.stack(others)).confidence(near)
         return None if confidence >= NEAR else f"{confidence:.2f}, expected {NEAR:.2f}"
@@ -47,7 +47,7 @@ class Examiner:
 
 @dataclass
 class Enrolment:
-    """One gesture that is being learned. `see` gives what to tell the user of each attempt."""
+    """The enrolment of one gesture. `see` returns what to tell the user about each attempt."""
 
     name: str
     sensor: str
@@ -61,7 +61,7 @@ class Enrolment:
         return len(self.kept) >= self.wanted
 
     def see(self, what: Segment | Cancelled) -> dict[str, Any]:
-        """Judge what was performed on the sensor: an example is kept, or there is a reason."""
+        """Judge an attempt on the sensor: the example is kept, or there is a reason why not."""
         reason = self._fault(what)
         return {"example": len(self.kept) + (reason is not None), "kept": reason is None, "reason": reason}
 

@@ -1,24 +1,24 @@
-"""Numbers that describe a window: touch-pattern features, which the forest takes, and what a gesture looked like.
+"""Features and measures of a window: the touch-pattern features that the forest takes, and what a gesture looked like.
 
 Source of the features: the paper's touch-pattern set (mean and maximum pressure, variability, row-wise and column-wise
-means, maximum and mean contact area, duration). Variability is taken of the frames, of the taxels, and of each row and
-column; the contact area also of the whole gesture. Pressures are shares of the segment's own peak, so that they do not
-depend on the sensor's gain. Measures of the training data stand in a model's metadata (`quantiles`), those of a
-deployment are held against them.
+means, maximum and mean contact area, duration). Variability is that of the frames, of the taxels, and of each row and
+column; the contact area is also that of the whole gesture. Pressures are shares of the segment's own peak, so they do
+not depend on the sensor's gain. A model's metadata (`quantiles`) hold the measures of its training data, with which
+those of a deployment are compared.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-PRESSED = 0.2  # of the peak: from there on a taxel or a frame counts as touched, for `touch_pattern`
+PRESSED = 0.2  # of the peak: for `touch_pattern`, a taxel or a frame from this share on counts as touched
 
 MEASURES = ("duration_s", "area", "speed", "noise")
-ACTIVE = 0.15  # of the peak: from there on a frame counts as touched, for `measures`
-COVERED = 0.2  # of the peak: from there on a taxel counts as touched, for `measures`
+ACTIVE = 0.15  # of the peak: for `measures`, a frame from this share on counts as touched
+COVERED = 0.2  # of the peak: for `measures`, a taxel from this share on counts as touched
 
 
 def feature_names(rows: int, columns: int) -> tuple[str, ...]:
-    """Names of what `touch_pattern` returns for windows of rows x columns."""
+    """The names of the features that `touch_pattern` returns for windows of rows x columns."""
     lines = [f"row_{r}" for r in range(rows)] + [f"column_{c}" for c in range(columns)]
     return (
         "mean_pressure", "maximum_pressure", "variability", "mean_taxel_variability", "maximum_taxel_variability",
@@ -30,7 +30,7 @@ def feature_names(rows: int, columns: int) -> tuple[str, ...]:
 def touch_pattern(window: NDArray[np.float32], rate_hz: float) -> NDArray[np.float32]:
     """(T, R, C) window -> (F,) features in the order of `feature_names`.
 
-    Frames without contact count for nothing, so idle frames around the gesture change nothing.
+    Frames without contact are left out, so idle frames around the gesture change nothing.
     """
     touched = window[window.max(axis=(1, 2)) >= PRESSED].astype(np.float64)
     if not len(touched):
@@ -51,11 +51,11 @@ def touch_pattern(window: NDArray[np.float32], rate_hz: float) -> NDArray[np.flo
 
 
 def measures(window: NDArray[np.float32], rate_hz: float) -> dict[str, float]:
-    """(T, R, C) window -> `MEASURES`, all 0 for one without contact.
+    """(T, R, C) window -> `MEASURES`, all 0 for a window without contact.
 
-    duration_s: of the frames in contact. area: mean share of the grid in contact. speed: way of the centroid, in
-    sides of the grid a second. noise: share of the pressure outside of the contact, which is the sensor's noise, hum
-    and crosstalk, and the contact's skirts.
+    duration_s: length of the frames in contact. area: mean share of the grid in contact. speed: way of the centroid,
+    in sides of the grid a second. noise: share of the pressure that is outside of the contact, from the sensor's noise,
+    hum, crosstalk, and the skirts of the contact.
     """
     active = window[window.max(axis=(1, 2)) >= ACTIVE].astype(np.float64)
     if not len(active):

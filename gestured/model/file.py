@@ -1,4 +1,4 @@
-"""A model's file before onnxruntime sees it: its bytes, its digest, whether it needs other files; its self-test.
+"""A model's file before onnxruntime sees it: its bytes, its digest, its self-test, and that it needs no other file.
 
 Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
 """
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from gestured.record.files import open_regular
 
-# Far more than a net for a grid of taxels needs; while a file is opened, memory holds it some five times.
+# Far more than a net for a grid of taxels needs. While a file is opened, memory holds it some five times.
 MAX_MODEL_BYTES = 32 << 20
-# What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
+# The bytes of a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
 DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
 # The word `location`, by which a tensor names the file of its data, after the word's length as protobuf writes it.
 _LOCATION = re.compile(rb"(?:\x08|\x88\x80*\x00)location")
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file's bytes, read once; a regular file of at most `MAX_MODEL_BYTES`."""
+    """The bytes of a regular file of at most `MAX_MODEL_BYTES`, read once. Raises ValueError for any other file."""
     try:
         with open_regular(path) as file:
             data = file.read(MAX_MODEL_BYTES + 1)
@@ -45,10 +45,10 @@ def sealed(data: bytes) -> bytes:
 
 
 def has_digest(data: bytes) -> bool:
-    """Whether a model's file ends in its digest; ValueError where that is not the digest of what comes before."""
+    """Whether a model's file ends in a digest. Raises ValueError if it is not the digest of what comes before."""
     end = len(data) - len(DIGEST) - 2 * hashlib.sha256().digest_size
     found = data[max(end, 0) : max(end, 0) + len(DIGEST)]
-    # A digest whose own name is damaged is still one; the end of any other entry has hardly a byte in common with it.
+    # A digest with a damaged head counts as a digest: the end of any other entry has hardly a byte in common with it.
     if sum(one == other for one, other in zip(found, DIGEST, strict=False)) < len(DIGEST) // 2:
         return False
     if data != sealed(data[:end]):
@@ -57,10 +57,10 @@ def has_digest(data: bytes) -> bool:
 
 
 def check_alone(data: bytes) -> None:
-    """ValueError for a model with data in another file, which onnxruntime would read with this process's rights.
+    """Raise ValueError for a model with data in another file, which onnxruntime would read with this process's rights.
 
     onnxruntime follows names relative to the current folder, and version 1.24 also links, absolute names and addresses
-    in memory. Data in another file without a `location` it refuses by itself (tests/test_models.py).
+    in memory. It refuses by itself data in another file without a `location` (tests/test_models.py).
     """
     if _LOCATION.search(data):
         raise ValueError("keeps data in another file, expected everything in this one")
@@ -72,7 +72,7 @@ def packed(values: NDArray[np.floating[Any]]) -> str:
 
 
 def unpacked(text: object) -> NDArray[np.float32]:
-    """(n,) what `packed` wrote. Raises TypeError or ValueError for anything else, or what is not finite."""
+    """The (n,) numbers that `packed` wrote. Raises TypeError or ValueError for anything else, or if not finite."""
     if not isinstance(text, str):
         raise TypeError("expected base64")
     values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").astype(np.float32)
@@ -102,7 +102,7 @@ class SelfTest:
 
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> "SelfTest":
-        """The self-test that `to_json` wrote, parsed; ValueError says what was expected."""
+        """The self-test of the parsed JSON that `to_json` wrote. Raises ValueError, which says what was expected."""
         try:
             values = unpacked(stored["values"]).reshape(stored["shape"])
             scores, unknown = (np.asarray(stored[key], np.float32) for key in ("scores", "unknown"))

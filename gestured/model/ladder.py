@@ -1,4 +1,4 @@
-"""The ladder of fallbacks: models, best first, as one classifier."""
+"""The ladder: a model and its fallbacks, best first, as one classifier."""
 
 import math
 import time
@@ -22,18 +22,17 @@ from gestured.model.rung import Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
 SLOW_S = 0.05  # a run that takes longer counts as slow, since it delays an answer; some milliseconds are usual
-SLOW_RUNS = 3  # slow runs in a row put a rung aside; a single one may be the fault of another program
-RETRY_S = 30.0  # how long a rung is put aside: trying it again may delay another answer
+SLOW_RUNS = 3  # so many slow runs in a row put a rung aside; one may be the fault of another program
+RETRY_S = 30.0  # a rung is put aside for so long, since trying it again may delay another answer
 
 
 class Ladder:
     """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
 
-    A rung that raises or gives scores that are not finite is put aside for RETRY_S of `clock`, as is one that took more
-    than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. Where `slow_s` is infinite no run is ended
-    for its length, either. One that cannot be opened is put aside for good. Rungs that are aside still come last,
-    before giving up. What another rung than the first says is `degraded`. Gestures of the user's own are compared by
-    the rung that answers.
+    A rung that raises or gives scores that are not finite is put aside for RETRY_S of `clock`, and then tried again.
+    So is a rung that took more than `slow_s` seconds SLOW_RUNS times in a row. A rung that cannot be opened is put
+    aside for good. If no other rung can answer, those that are aside are tried before giving up. An answer of any rung
+    but the first is `degraded`. The rung that answers also compares gestures of the user's own.
     """
 
     def __init__(
@@ -44,9 +43,10 @@ class Ladder:
         clock: Callable[[], float] = time.perf_counter,
         report: Callable[[str], None] | None = None,
     ) -> None:
-        """Opens the first rung that can be opened; ModelError where none can, or one knows other gestures.
+        """Open the first rung that can be opened. Raises ModelError if none can, or if one knows other gestures.
 
-        `report` is told in one sentence what happened to a rung.
+        If `slow_s` is infinite, this ladder does not make the process end long runs (`limit.hurry`). `report` is
+        called with a sentence that says what happened to a rung.
         """
         if not rungs:
             raise ModelError("a ladder needs at least one model")
@@ -57,7 +57,7 @@ class Ladder:
         self.report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long
-        self._previews_from = -math.inf  # s of `clock`, before which there are no previews
+        self._previews_from = -math.inf  # s of `clock`; before this time there are no previews
         self.own = Own({})  # gestures of the user's own; may be replaced between two segments
         self._active, opened = self._first_open()
         self.gestures = opened.gestures
@@ -66,14 +66,14 @@ class Ladder:
             self._check_gestures(rung)
 
     def compared(self, examples: Examples) -> Own:
-        """Gestures of the user's own as the model that answers sees their examples, which takes up to a second."""
+        """Own gestures with the prototypes of the model that answers. It takes up to a second to make them."""
         own = Own(examples, self.gestures)
         own.make(self.model)
         return own
 
     @property
     def name(self) -> str:
-        """The best rung's name, whether or not it can be used."""
+        """The name of the best rung, whether or not that rung can be used."""
         return self.rungs[0].name
 
     @property
@@ -83,17 +83,17 @@ class Ladder:
 
     @property
     def source(self) -> str:
-        """The file, or the shipped name, of `active`."""
+        """The file, or the shipped name, of the active rung."""
         return str(self._active.source)
 
     @property
     def rung(self) -> int:
-        """How far down `active` stands; 0 is the best."""
+        """The index of the active rung; 0 is the best."""
         return self.rungs.index(self._active)
 
     @property
     def degraded(self) -> bool:
-        """Whether `active` is a fallback."""
+        """Whether the active rung is a fallback."""
         return self._active is not self.rungs[0]
 
     @property
@@ -102,7 +102,7 @@ class Ladder:
         return self._active.open()
 
     def classify(self, segment: Segment) -> Scores:
-        """Scores of the best rung that can give them; raises ModelError where none can."""
+        """The scores of the best rung that can give them. Raises ModelError if none can."""
         now = self._clock()
         ready = [rung for rung in self.rungs if now >= rung.aside_until]
         aside = [rung for rung in self.rungs if now < rung.aside_until]
@@ -116,7 +116,7 @@ class Ladder:
                 took = self._clock() - start
                 if not (np.isfinite(scores.values).all() and math.isfinite(scores.unknown)):
                     raise ModelError(f"{rung.name}: gave scores that are not finite")
-            except Exception as error:  # whatever a rung dies of, the next one answers
+            except Exception as error:  # whatever makes a rung fail, the next one answers
                 self._put_aside(rung, str(error) or type(error).__name__)
                 continue
             self._timed(rung, took)
@@ -129,14 +129,14 @@ class Ladder:
 
     @property
     def certainty(self) -> Certainty | None:
-        """How sure the active rung must be of a contact that is not over; None where it was not made for that."""
+        """How sure the active rung must be of a contact that is not over; None if it was not made for that."""
         return None if self._active.model is None else self._active.model.certainty
 
     def preview(self, segment: Segment) -> Scores | None:
-        """Scores of the beginning of a segment by the active rung, None where that fails.
+        """The active rung's scores of the beginning of a segment, None if that fails.
 
-        No rung is put aside, tried again or reported for it. Where SLOW_RUNS previews in a row failed or were slow,
-        there are none for RETRY_S.
+        A preview puts no rung aside, tries none again and reports none. After SLOW_RUNS previews in a row that failed
+        or were slow, there are none for RETRY_S.
         """
         model, start = self._active.model, self._clock()
         if model is None or start < self._previews_from:
@@ -159,13 +159,13 @@ class Ladder:
             except ModelError as error:
                 failed.append((rung, str(error)))
                 continue
-            for other, reason in failed:  # where no rung can be opened, the error below says all that there is to say
+            for other, reason in failed:  # if no rung can be opened, the error below gives the reasons instead
                 self._put_aside(other, reason)
             return rung, opened
         raise ModelError("; ".join(reason for _, reason in failed))
 
     def _check_gestures(self, rung: Rung) -> None:
-        """Put a fallback that cannot be opened aside; one that knows other gestures is a mistake."""
+        """Put a fallback aside that cannot be opened. Raises ModelError if it knows other gestures."""
         try:
             gestures = rung.gestures()
         except ModelError as error:
@@ -192,26 +192,26 @@ class Ladder:
 
 
 def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:
-    """The ladder of a model: its fallbacks are those named, else the shipped ones below a shipped model, else none.
+    """The ladder of a model with the named `fallbacks`; if None, the shipped ones below a shipped model, else none.
 
-    `settings` go to `Ladder`. Raises ModelError.
+    `settings` are passed to `Ladder`. Raises ModelError.
     """
     if fallbacks is None:
         name = shipped_name(source)
         below = LADDER[LADDER.index(name) + 1 :] if name is not None else ()
-        # By path: a file of that name in the working directory is not the shipped one.
+        # Fallbacks are given by path, since a file of that name in the working directory is not the shipped one.
         fallbacks = [shipped()[rung] for rung in below]
     return Ladder([source, *fallbacks], **settings)
 
 
 def report_missing_points(ladder: Ladder, strictness: Iterable[str | None]) -> None:
-    """Have the ladder report where a `strictness` is set that the model which answers does not have."""
+    """Have the ladder report if a `strictness` is set and the model that answers has no operating points."""
     if ladder.model.points is None and set(strictness) - {None, USUAL}:
         ladder.report(f"{ladder.active} has no operating points: whatever the strictness, it takes its one threshold")
 
 
 def require_gestures(ladder: Ladder, names: Iterable[str], field: str = "gestures") -> None:
-    """Raises SettingsError, which names the `field`, for a name that is no gesture of the ladder's."""
+    """Raise SettingsError, which names the `field`, for a name that is no gesture of the ladder's."""
     for name in names:
         if name not in ladder.gestures:
             known = ", ".join(ladder.gestures)
@@ -219,14 +219,14 @@ def require_gestures(ladder: Ladder, names: Iterable[str], field: str = "gesture
 
 
 def require_arming(scene: Scene, known: Sequence[str]) -> None:
-    """Raises SettingsError where a gesture that arms a sensor is not known: then no other would ever count."""
+    """Raise SettingsError if a gesture that arms a sensor is not known, since no other would ever count."""
     for field, gesture in scene.arming_gestures.items():
         if gesture not in known:
             raise SettingsError(f"{field} = {gesture!r}: is no gesture in use, expected any of {', '.join(known)}")
 
 
 def gestures_in_use(ladder: Ladder, chosen: Sequence[str] | None) -> tuple[str, ...]:
-    """The chosen gestures in the ladder's order, all where `chosen` is None. Raises SettingsError."""
+    """The chosen gestures in the ladder's order, all if `chosen` is None. Raises SettingsError."""
     if chosen is None:
         return ladder.gestures
     if isinstance(chosen, str):

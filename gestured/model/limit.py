@@ -1,10 +1,10 @@
-"""A run of a model that takes too long is ended: onnxruntime looks at its options' `terminate` between two operators.
+"""The limit of a model's runs: one that takes too long is ended, as onnxruntime checks `terminate` between operators.
 
-One thread watches all models of the process. It looks now and then while models are run, and is woken only
-for a limit that ends before its next look: to wake it for each run makes every run slower. A single operator that never
-ends is not ended by this; that is the business of the watchdog outside.
+One thread watches all models of the process. It looks now and then while models are run, and is woken only for a limit
+that ends before its next look, since waking it for each run would make every run slower. A single operator that never
+ends is not ended by this, but by the watchdog outside of the process.
 
-Nothing is ended before `hurry` was called: where nobody waits for answers, as in the laboratory or in a replay, a busy
+Nothing is ended before `hurry` was called: if nobody waits for answers, as in the laboratory or in a replay, a busy
 machine must not change them.
 """
 
@@ -14,27 +14,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-LOOK_S = 1.0  # the pause between two looks: shorter than a segment's run may take, so that no run wakes the thread
-AWAKE_S = 60.0  # how long after the last run the thread goes on looking
-ASLEEP_S = 3600.0  # the pause where nothing was run for AWAKE_S; the next run ends it
+LOOK_S = 1.0  # the pause between two looks: shorter than the limit of a segment's run, which so never wakes the thread
+AWAKE_S = 60.0  # the thread goes on looking for so long after the last run
+ASLEEP_S = 3600.0  # the pause if nothing was run for AWAKE_S; the next run ends it
 
-_running: dict[int, tuple[float, Any]] = {}  # by run: when its time is over (s, monotonic), and its options
+_running: dict[int, tuple[float, Any]] = {}  # by id of its options, of each run: its end in s (monotonic), and these
 _changed = threading.Condition()
 _thread: threading.Thread | None = None
 _used = 0.0  # s, when a model was last run
 _hurried = False
-_looks = 0.0  # s, when the thread looks next
+_looks = 0.0  # s, the thread's next look
 
 
 def hurry() -> None:
-    """From now on runs that take too long are ended: somebody waits for the answers of this process."""
+    """End runs that take too long from now on, since somebody waits for the answers of this process."""
     global _hurried
     _hurried = True
 
 
 @contextmanager
 def limited(options: Any, seconds: float) -> Iterator[None]:
-    """Sets `options.terminate` (of onnxruntime's RunOptions, new for each run) when the block takes longer."""
+    """Set `terminate` of `options`, onnxruntime's RunOptions and new for each run, if the block takes too long."""
     global _thread, _used
     if not _hurried:
         yield

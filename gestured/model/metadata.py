@@ -1,4 +1,4 @@
-"""What a model says of itself: the metadata of its file, checked key by key.
+"""The metadata of a model's file, in which the model describes itself, checked key by key.
 
 Functions here raise ValueError with the key and what was expected; `model.open_model` adds the file's name.
 """
@@ -19,12 +19,12 @@ from gestured.model.file import SelfTest
 from gestured.model.points import certainty, number, operating_points
 from gestured.model.prototypes import Space
 
-MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
-MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundred times as much memory as text
-MAX_NESTING = 16  # lists and objects inside each other in one value
-USUAL_THRESHOLD = 0.5  # of a model whose calibration has none: more probably right than wrong
+MAX_TEXT = 2 << 20  # the most characters of one value; the longest value is the self-test, some thousands
+MAX_ITEMS = 50_000  # the most items in the lists and objects of one value; each takes a hundred times its text's memory
+MAX_NESTING = 16  # the most lists and objects inside each other in one value
+USUAL_THRESHOLD = 0.5  # of a model whose calibration has none: its answer is more probably right than wrong
 GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
-# What is plain text, and what it may be, in words.
+# Keys whose values are plain text: the pattern, and the same in words.
 TEXTS = {
     "kind": (GESTURE_NAME, "1 to 64 of a-z, 0-9, _"),
     "version": (re.compile(r"[ -~]{1,64}"), "1 to 64 printable characters"),
@@ -41,21 +41,21 @@ class Metadata:
     kind: str
     version: str
     window: Window
-    features: tuple[str, ...] | None  # names, where the model takes features instead of frames
-    context: tuple[str, ...] | None  # names of what surrounds a segment that the model takes in, too
+    features: tuple[str, ...] | None  # names of the features that the model takes instead of frames, if it does
+    context: tuple[str, ...] | None  # names of the values of a contact's context that the model takes as well, if any
     calibration: Mapping[str, Any]
-    threshold: float  # the confidence from which an answer is published where there are no `points`
+    threshold: float  # the confidence from which an answer is published if there are no `points`
     training_data: str  # sha256
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
-    provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
-    points: Mapping[str, Point] | None  # by strictness: thresholds, and what they cost
-    curve: Curve  # what a threshold of all gestures alike would cost; empty without `points`
-    own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
+    provisional: Certainty | None  # how sure it must be of a contact that is not over, if it was made for that
+    points: Mapping[str, Point] | None  # operating points, by strictness
+    curve: Curve  # what one threshold for all gestures would cost; empty without `points`
+    own: Space | None  # the space in which own gestures are compared; None for a model that has none
 
     @classmethod
     def parse(cls, properties: Mapping[str, str], *, sealed: bool = False) -> "Metadata":
-        """Check every key; ValueError names the key and what was expected.
+        """The metadata of a file's `properties`, every key checked. Raises ValueError, which names the key.
 
         `sealed`: whether the file ends in a digest that is right.
         """
@@ -110,7 +110,7 @@ class Metadata:
 
 
 def _check_grid(properties: Mapping[str, str], window: Window) -> None:
-    """Grid and rate stand in the metadata by themselves, too, and must be the window's."""
+    """Raise ValueError unless the grid and the rate, which have keys of their own, are those of the window."""
     for key in ("rows", "columns", "rate_hz"):
         expected = getattr(window, key)
         try:
@@ -122,7 +122,7 @@ def _check_grid(properties: Mapping[str, str], window: Window) -> None:
 
 
 def _check_extent(key: str, text: str) -> None:
-    """Raises ValueError for a value whose JSON would take too much memory; it is counted before it is parsed."""
+    """Raise ValueError for a value whose JSON would take too much memory; its items are counted before it is parsed."""
     if len(text) > MAX_TEXT:
         raise ValueError(f"metadata {key[:64]!r} has {len(text)} characters, expected at most {MAX_TEXT}")
     items = depth = 0
@@ -144,7 +144,7 @@ def _names(least: int, most: int, text: str) -> tuple[str, ...]:
 
 
 def _features(window: Window, text: str) -> tuple[str, ...]:
-    """The names of what a model takes instead of frames: all touch-pattern features of its grid, in their order."""
+    """The names of a model's features, which must be all touch-pattern features of its grid, in their order."""
     expected = feature_names(window.rows, window.columns)
     if _json(text, list) != list(expected):
         grid = f"{window.rows} x {window.columns}"
@@ -153,7 +153,7 @@ def _features(window: Window, text: str) -> tuple[str, ...]:
 
 
 def _context(text: str) -> tuple[str, ...]:
-    """The names of what surrounds a segment, all of which this version can tell."""
+    """The names of a model's context values, each of which this version must know."""
     names = _names(1, len(CONTEXT), text)
     if odd := [name for name in names if name not in CONTEXT]:
         raise ValueError(f"{odd[0]!r} is unknown, expected some of {', '.join(CONTEXT)}")

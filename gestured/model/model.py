@@ -19,23 +19,23 @@ from gestured.model.file import check_alone, has_digest
 from gestured.model.metadata import Metadata
 from gestured.model.session import Session
 
-TOLERANCE = 1e-3  # by which outputs may miss the self-test's, since other processors round differently
-ROUNDING = 1e-4  # by which a probability may lie outside of 0 to 1
-SUM_ROUNDING = 1e-3  # by which probabilities may miss 1 together
-RUN_S = 1.5  # that one segment may take; some milliseconds are usual
-SELF_TEST_S = 10.0  # that the self-test's few segments may take while the machine is busy starting
-BATCH_S = 3600.0  # that any number of segments at once may take
+TOLERANCE = 1e-3  # outputs may differ by so much from the self-test's, since other processors round differently
+ROUNDING = 1e-4  # a probability may lie by so much outside of 0 to 1
+SUM_ROUNDING = 1e-3  # the sum of probabilities may differ by so much from 1
+RUN_S = 1.5  # the longest run on one segment; some milliseconds are usual
+SELF_TEST_S = 10.0  # the longest run on the self-test's few segments, as the machine may be busy starting
+BATCH_S = 3600.0  # the longest run on any number of segments at once
 
 
 class Model:
     """A model that has passed every check; implements `Classifier`."""
 
     def __init__(self, data: bytes, name: str) -> None:
-        """Open the bytes of a file; `name` is the model's in events. ValueError says what is wrong."""
+        """Open the bytes of a file; `name` is the model's name in events. Raises ValueError if anything is wrong."""
         self.name = name
         self.size = len(data)
         self.sha256 = hashlib.sha256(data).hexdigest()
-        self.sealed = has_digest(data)  # whether it ends in its digest; else the self-test alone finds damage
+        self.sealed = has_digest(data)  # whether it ends in its digest; else only the self-test can find damage
         check_alone(data)
         self._session = Session(data)
         self.properties = self._session.properties()
@@ -53,9 +53,9 @@ class Model:
         self.self_test_error = self._self_test()
 
     def classify(self, segment: Segment) -> Scores:
-        """Scores of one segment. A segment that is empty or not finite is unknown, whatever a net would say.
+        """The scores of one segment. A segment that is empty or not finite is unknown, whatever a net would say.
 
-        Raises ModelError where the model fails or does not give probabilities.
+        Raises ModelError if the model fails or does not give probabilities.
         """
         with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
             signed = self.metadata.window.signed(segment)
@@ -76,7 +76,7 @@ class Model:
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold, points=self.points)
 
     def preview(self, segment: Segment) -> Scores | None:
-        """Scores of the beginning of a segment, None where that fails."""
+        """The scores of the beginning of a segment, None if that fails."""
         try:
             return self.classify(segment)
         except ModelError:
@@ -87,8 +87,8 @@ class Model:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(B, T, R, C) windows or (B, F) features -> scores (B, G), unknown (B,).
 
-        `beside` (B, K) is what surrounded them, the values of `context.NAMES`; without it they count as undisturbed.
-        ValueError where the model fails, takes longer than `limit_s`, or what it gives are no probabilities.
+        `beside` is their (B, K) context, the values of `context.NAMES`; without it they count as clear gestures on an
+        undisturbed sensor. Raises ValueError if the model fails, exceeds `limit_s`, or gives no probabilities.
         """
         scores, unknown = self._session.run(("scores", "unknown"), self._inputs(batch, beside), limit_s)
         expected = (len(batch), len(self.gestures))
@@ -110,7 +110,7 @@ class Model:
         return {self._input: batch, "context": told}
 
     def embed(self, batch: NDArray[np.float32], limit_s: float = BATCH_S) -> NDArray[np.float32]:
-        """(B, T, R, C) windows -> (B, E) embedding, of a model that has one (`embeds`). ValueError as for `run`."""
+        """(B, T, R, C) windows -> (B, E) embeddings, by a model that `embeds`. Raises ValueError as `run` does."""
         (embedding,) = self._session.run(("embedding",), self._inputs(batch, None), limit_s)
         if embedding.ndim != 2 or len(embedding) != len(batch) or not np.isfinite(embedding).all():
             raise ValueError(f"embedding has the shape {embedding.shape}, expected ({len(batch)}, E), all finite")
@@ -136,7 +136,7 @@ class Model:
         }
 
     def _self_test(self) -> float:
-        """The largest difference from the stored outputs; ValueError where it is above `TOLERANCE`."""
+        """The largest difference from the stored outputs. Raises ValueError if it is above `TOLERANCE`."""
         test = self.metadata.self_test
         expected = (len(test.values), len(self.gestures))
         rank = 4 if self._input == "frames" else 2

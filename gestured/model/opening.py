@@ -1,8 +1,8 @@
-"""A model's file is opened here, or looked at in a process of its own.
+"""The opening of a model's file, and the check of one without opening it in this process.
 
-A file is read once, checked against the manifest (where it ships) or tried in a process of its own first (where it
-does not: `process`), and opened from those bytes. Whatever is wrong is one `ModelError`: the file, what is wrong, what
-was expected.
+A file is read once and opened from those bytes. One that ships is compared with its manifest first; any other is tried
+in a process of its own first (`process`). Whatever is wrong is a `ModelError`, which names the file, what is wrong and
+what was expected.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from gestured.model.model import Model
 from gestured.model.process import try_out
 from gestured.model.shipped import naming, read
 
-# Models of this process by sha256 and name: they have no state, so that any number of ladders may hold one.
+# Models of this process by sha256 and name. They have no state, so any number of ladders may share one.
 _opened: WeakValueDictionary[tuple[str, str], Model] = WeakValueDictionary()
 
 

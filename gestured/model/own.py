@@ -21,25 +21,25 @@ class PrototypeSet:
 
     space: Space
     prototypes: Mapping[str, Prototype]
-    doubtful: tuple[str, ...]  # sentences: which gestures this model cannot tell apart
+    doubtful: tuple[str, ...]  # sentences that say which gestures this model cannot tell apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """What one model makes of a segment."""
+    """The place of a segment in the space of one model, and what the model takes the segment for."""
 
     place: Array  # (K,)
-    taken: tuple[str, float] | None  # the model's gesture and its confidence, where no own one could take it
+    taken: tuple[str, float] | None  # the model's gesture and its confidence, if no own gesture could take the segment
 
     @classmethod
     def of(cls, model: Model, space: Space, segment: Segment) -> "Placed":
-        """What a model makes of a segment. Raises ModelError where it fails, or that is not finite."""
+        """What a model makes of a segment. Raises ModelError if the model fails, or the segment is not finite."""
         scores, where = model.classify(segment), place(model, space, segment)
         sure = scores.confidence >= scores.threshold and space.claimed(where)
         return cls(where, (model.gestures[int(scores.values.argmax())], scores.confidence) if sure else None)
 
 
-# What models made of examples, as long as both are in use; each takes some runs of the model.
+# What models have made of examples, kept as long as both are in use, since each takes some runs of the model.
 _placed: WeakKeyDictionary[Model, WeakKeyDictionary[Example, Placed]] = WeakKeyDictionary()
 
 
@@ -47,14 +47,14 @@ class Own:
     """The user's own gestures, and the prototypes of them that each model has made."""
 
     def __init__(self, gestures: Examples, known: Collection[str] = ()) -> None:
-        """`known` are the models' gestures: one of the user's own that is called the same is off."""
+        """`known` are the model's gestures: an own gesture with such a name is hidden."""
         self.gestures = {name: examples for name, examples in gestures.items() if name not in known}
         self.hidden = tuple(name for name in gestures if name in known)
-        self.missing: Callable[[Model], None] = self.make  # called while a model answers that has no prototypes yet
+        self.missing: Callable[[Model], None] = self.make  # called when a model that has no prototypes yet answers
         self._banks: WeakKeyDictionary[Model, PrototypeSet | None] = WeakKeyDictionary()
 
     def match(self, model: Model, segment: Segment) -> Match | None:
-        """The own gesture that is nearest to a segment; None where the model has no embedding, or fails to give one."""
+        """The own gesture that is nearest to a segment; None if the model has no embedding, or fails to give one."""
         bank = self._bank(model)
         if bank is None:
             return None
@@ -64,7 +64,7 @@ class Own:
             return None
 
     def nearest_to(self, model: Model, example: Example) -> Match | None:
-        """The own gesture that is nearest to an example, as `match`. Raises ModelError where the model fails."""
+        """The own gesture that is nearest to an example, as `match` gives it. Raises ModelError if the model fails."""
         bank = self._bank(model)
         return None if bank is None else nearest(bank.space, bank.prototypes, placed(model, bank.space, example).place)
 
@@ -79,7 +79,7 @@ class Own:
         self._banks[model] = bank
 
     def made(self, model: Model) -> PrototypeSet | None:
-        """The prototypes of a model, where they are made; any thread may look."""
+        """The prototypes of a model, None before they are made; any thread may ask."""
         return self._banks.get(model)
 
     def _bank(self, model: Model) -> PrototypeSet | None:
@@ -99,7 +99,7 @@ class Own:
 
 
 def placed(model: Model, space: Space, example: Example) -> Placed:
-    """What a model makes of an example, found out once. Raises ModelError where the model fails."""
+    """What a model makes of an example, found out only once. Raises ModelError if the model fails."""
     known = _placed.setdefault(model, WeakKeyDictionary())
     found = known.get(example)
     if found is None:
@@ -108,7 +108,7 @@ def placed(model: Model, space: Space, example: Example) -> Placed:
 
 
 def place(model: Model, space: Space, segment: Segment) -> Array:
-    """(K,) place of a segment. Raises ModelError where the model fails, or the segment is not finite."""
+    """The place (K,) of a segment. Raises ModelError if the model fails, or the segment is empty or not finite."""
     with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
         window: NDArray[np.float32] = model.metadata.window.apply(segment)
         if not (len(window) and np.isfinite(segment.frames).all() and np.isfinite(window).all()):

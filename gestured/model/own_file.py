@@ -12,8 +12,8 @@ from gestured.core.own import Examples, from_dict, to_dict
 from gestured.record.files import PRIVATE, atomic_write, open_regular
 
 FORMAT = 1
-MAX_BYTES = 8 << 20  # the longest examples of as many gestures as there may be take some 5 MiB
-MOST_MARKS = 4096  # brackets and commas; as many examples as there may be take some 1,100
+MAX_BYTES = 8 << 20  # the most gestures, with the longest examples, take some 5 MiB
+MOST_MARKS = 4096  # the most brackets and commas; the most gestures with the most examples take some 1,100
 NAME = "own-gestures.json"
 REMEDY = "set own_gestures = FILE (--own-gestures FILE)"
 NO_FILE = f"there is no file for own gestures, since there is no home: {REMEDY}"
@@ -28,12 +28,12 @@ class OwnFile(NamedTuple):
 
     path: Path | None
     gestures: Examples
-    fault: str | None = None  # why it cannot be read: the model's gestures go on without it
-    sha256: str = ""  # of its bytes; empty where there is none
+    fault: str | None = None  # why the file cannot be read; the model's gestures go on without it
+    sha256: str = ""  # of its bytes; empty if there is no file
 
 
 def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
-    """The file that was set, else the one in the state directory of systemd, of the session, of the home, else None."""
+    """The path that was set, else one in the state directory of systemd, else of the session or the home, else None."""
     if chosen is not None:
         return chosen
     if directory := environ.get("STATE_DIRECTORY"):
@@ -45,9 +45,9 @@ def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
 
 
 def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
-    """Read the file; there are no gestures where there is none, or where it cannot be read.
+    """Read the file; without a file, or if it cannot be read, there are no gestures.
 
-    A file that has not changed gives what is `known` of it, so that its examples stay the same objects.
+    For a file that has not changed, `known` is returned, so that its examples stay the same objects.
     """
     try:
         data = _read(path)
@@ -63,7 +63,7 @@ def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
 
 
 def _read(path: Path | None) -> bytes | None:
-    """The file's bytes, None where there is none. Raises OwnFileError."""
+    """The file's bytes, None if there is no file. Raises OwnFileError."""
     if path is None:
         return None
     try:
@@ -79,7 +79,7 @@ def _read(path: Path | None) -> bytes | None:
 
 
 def _parse(data: bytes) -> Examples:
-    # What reads JSON lets no other thread run before its end, and millions of empty lists fit into the bytes.
+    # Millions of empty lists fit into the bytes, and Python's JSON reader lets no other thread run before its end.
     if sum(map(data.count, (b"[", b"{", b","))) > MOST_MARKS:
         raise ValueError(f"expected at most {MOST_MARKS} brackets and commas")
     told = json.loads(data)

@@ -1,6 +1,6 @@
-"""How sure a model must be, as its metadata `operating_points` and `provisional` say, parsed JSON.
+"""Operating points and certainty of a model, read from the parsed JSON of `operating_points` and `provisional`.
 
-What is wrong with one is a ValueError that names the key and what was expected.
+Functions here raise ValueError, which names the key and what was expected.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -8,15 +8,15 @@ from typing import Any
 
 from gestured.core.points import STRICTNESS, Certainty, Curve, Needed, Point
 
-MOST = 1e6  # hours, and false gestures an hour: no measurement has more, and it keeps numbers within a float's range
-MOST_ROWS = 1000  # of the curve
-MOST_IN_A_ROW = 100  # frames; a model that needs more says nothing in time
-MOST_S = 3600.0  # longer than any contact
+MOST = 1e6  # the most hours, and false gestures an hour: no measurement has more, and floats can hold it
+MOST_ROWS = 1000  # the most rows of the curve
+MOST_IN_A_ROW = 100  # the most frames in a row: a model that needs more says nothing in time
+MOST_S = 3600.0  # the longest elapsed time, longer than any contact
 COSTS = {"missed": 1.0, "false_per_hour": MOST, "hours": MOST}  # of a point, each with the most that it may be
 
 
 def operating_points(found: Mapping[str, Any], gestures: Collection[str]) -> tuple[Mapping[str, Point], Curve]:
-    """By strictness the points, and the curve that they lie on, that `found` holds for a model of these gestures."""
+    """The operating points in `found`, by strictness, and their curve, for a model of these gestures."""
     _require_keys("", found, (*STRICTNESS, "curve"))
     points: dict[str, Point] = {
         strictness: _point(strictness, found[strictness], gestures) for strictness in STRICTNESS
@@ -25,7 +25,7 @@ def operating_points(found: Mapping[str, Any], gestures: Collection[str]) -> tup
 
 
 def certainty(found: Mapping[str, Any], gestures: Collection[str]) -> Certainty:
-    """The certainty that `found` holds for a model of these gestures."""
+    """The certainty in `found`, for a model of these gestures."""
     _require_keys("", {"gestures": {}, **found}, ("in_a_row", "elapsed_s", "thresholds", "tap", "gestures"))
     row, begins, own = found["in_a_row"], found["elapsed_s"], found.get("gestures", {})
     if isinstance(row, bool) or not isinstance(row, int) or not 1 <= row <= MOST_IN_A_ROW:
@@ -74,12 +74,12 @@ def _needed(key: str, found: Any, length: int) -> Needed:
 
 
 def _confidence(key: str, found: Any) -> float | None:
-    """A confidence; None is never."""
+    """A confidence, or None if none is enough."""
     return None if found is None else number(key, found, 1.0)
 
 
 def number(key: str, found: Any, most: float) -> float:
-    """A number from 0 to `most`; ValueError for anything else."""
+    """A number from 0 to `most`. Raises ValueError for anything else."""
     if isinstance(found, bool) or not isinstance(found, int | float) or not 0 <= found <= most:
         raise ValueError(f"{key}: expected a number from 0 to {most:g}, found {_brief(found)}")
     return float(found)

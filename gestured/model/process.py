@@ -1,8 +1,8 @@
-"""A model file that nobody has vouched for is tried in a process of its own: whatever it does there costs us nothing.
+"""The trial of a model file that does not ship, in a process of its own, where whatever it does can do no harm.
 
-A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for what crashes it; and a run that does
-not return cannot be ended from within a process. So the file is opened and tested by `worker`, in a child that has
-bounds for memory and for time.
+A graph of some kilobytes can make onnxruntime run for hours, take all memory, or crash; and a run that does not return
+cannot be ended from within a process. So `worker` opens and tests the file, in a child with bounds for memory and for
+time.
 
 The child reads its standard input to the end: one byte, which is the seconds that it may take, then the file. It
 answers with one line of JSON.
@@ -18,19 +18,19 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual, and an operator's client waits for 20
-MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
-# The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
+OPEN_S = 8  # the longest time to open a model and to test it; half a second is usual, and a client waits for 20
+MAX_ANSWER = 16 << 20  # the most bytes of an answer; a report holds some of the metadata, which are bounded
+# The child imports from our own interpreter's folders, and nothing from the environment or the current folder.
 START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"
 ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
-_turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
-_child: "subprocess.Popen[bytes] | None" = None  # the one that was started last
+_turn = threading.Lock()  # one file is tried at a time, since each child takes memory of the same service
+_child: "subprocess.Popen[bytes] | None" = None  # the child that was started last
 _ending = False
 
 
 def try_out(data: bytes) -> dict[str, Any]:
-    """`Model.report` of a file that opens and passes its self-test. ValueError says what is wrong with it."""
+    """`Model.report` of a file that opens and passes its self-test. Raises ValueError, which says what is wrong."""
     global _child
     with _turn, _started() as child:  # leaving this block waits for the child's end
         _child = child
@@ -55,7 +55,7 @@ def try_out(data: bytes) -> dict[str, Any]:
 
 
 def end_all() -> None:
-    """End the child, and let none do any work from now on: the program ends. A signal's handler may ask for it.
+    """End the child and let no other work from now on, since the program ends. A signal handler may call this.
 
     A child that is being started meanwhile finds the end of its input, and ends by itself.
     """
@@ -66,7 +66,7 @@ def end_all() -> None:
 
 
 def _end_of(child: "subprocess.Popen[bytes]") -> str:
-    """Why a child has ended without an answer."""
+    """The reason why a child has ended without an answer."""
     child.kill()
     status = child.wait()
     if status == -signal.SIGALRM:
@@ -90,7 +90,7 @@ def _started() -> "subprocess.Popen[bytes]":
             cwd="/",
             env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
             | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
-            start_new_session=True,  # Ctrl-C is for us
+            start_new_session=True,  # Ctrl-C is for this process alone
         )
     except OSError as error:
         raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error

@@ -1,8 +1,8 @@
 """Prototypes: what a few examples say of a gesture of the user's own, in the space of a model's embedding.
 
-What differs between two performances of one person, and how far apart two gestures lie, is learned in the lab from
-many people (`Space`, a model's metadata `own`). A prototype is the mean of its examples, drawn to the space's
-mean where they are few. How near a segment is to it is a likelihood ratio: that gesture against any movement at all.
+How much two performances of one person differ, and how far apart two gestures lie, is learned in the lab from many
+people (`Space`, a model's metadata `own`). A prototype is the mean of its examples, drawn towards the space's mean if
+they are few. The nearness of a segment to it is a log likelihood ratio: that gesture against any movement at all.
 """
 
 import json
@@ -18,8 +18,8 @@ from gestured.core.classifier import NEAR, Match
 from gestured.core.own import EXAMPLES
 from gestured.model.file import packed, unpacked
 
-DIMENSIONS = 512  # of a space or an embedding, at most
-SUREST = 40.0  # log odds that a confidence tells: beyond them it is 0 or 1 in any case, and `exp` would overflow
+DIMENSIONS = 512  # the most of a space or an embedding
+SUREST = 40.0  # log odds beyond which a confidence is 0 or 1 in any case; far beyond them `exp` would overflow
 
 Array = NDArray[np.float64]
 
@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 class Space:
     """Where embeddings of one model are compared: K directions, in which one person's repetitions spread by 1."""
 
-    mean: Array  # (E,) of embeddings
-    directions: Array  # (K, E) from an embedding to a place
-    between: Array  # (K,) variance of gestures, in units of the variance within one
+    mean: Array  # (E,) the mean of embeddings
+    directions: Array  # (K, E) the map from an embedding to a place
+    between: Array  # (K,) variance between gestures, in units of the variance within one
     built_in: Array  # (2, G, K) mean and variance of each of the model's gestures, over people
     thresholds: tuple[float, ...]  # nearness that a gesture of 1, 2 ... EXAMPLES examples asks for
-    slope: float  # of the confidence over the nearness
-    margin: float  # by how much nearer than the model's gestures a segment must be to be taken from the model
+    slope: float  # slope of a confidence's log odds over the nearness
+    margin: float  # a segment is taken from the model's gestures if it is nearer to an own one by so much
 
     def place(self, embedding: NDArray[np.floating[Any]]) -> Array:
         """(..., E) embeddings -> (..., K) places."""
@@ -46,7 +46,7 @@ class Space:
         return np.asarray(_ratio(place[..., np.newaxis, :], mean, variance, self.between).max(axis=-1))
 
     def claimed(self, place: Array) -> bool:
-        """Whether a gesture that is performed there lies too near to the model's gestures to be taken from them."""
+        """Whether a gesture performed at a place (K,) is too near to the model's gestures to be taken from them."""
         alone = Prototype.of(self, place[np.newaxis])
         usual = alone.nearness(alone.mean) - len(self.between) / 2  # a performance is 1 away in each direction
         return bool(usual - self.built_in_nearness(place) < self.margin)
@@ -67,7 +67,7 @@ class Space:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any], gestures: int) -> "Space":
-        """The space that `to_json` wrote, of a model with so many gestures; ValueError says what was expected."""
+        """The space that `to_json` wrote, of a model with so many `gestures`. Raises ValueError for anything else."""
         try:
             mean, between = _values(told, "mean"), _values(told, "between")
             inner, outer = len(between), len(mean)
@@ -91,8 +91,8 @@ class Prototype:
     """One gesture of the user's own in a space."""
 
     space: Space
-    mean: Array  # (K,) where it is expected
-    variance: Array  # (K,) of a performance around that
+    mean: Array  # (K,) the place at which a performance is expected
+    variance: Array  # (K,) variance of a performance around that place
     threshold: float  # nearness from which a segment is this gesture
 
     @classmethod
@@ -104,17 +104,17 @@ class Prototype:
         return cls(space, mean, 1.0 + sure / n, space.thresholds[n - 1])
 
     def nearness(self, place: Array) -> Array:
-        """Log likelihood of a place (..., K), given this gesture, over that given any movement."""
+        """The log of the likelihood ratio of places (..., K): this gesture against any movement."""
         return _ratio(place, self.mean, self.variance, self.space.between)
 
     def confidence(self, place: Array) -> float:
-        """How surely a place (K,) is this gesture, 0 to 1; NEAR at the threshold."""
+        """The confidence, 0 to 1, that a place (K,) is this gesture; NEAR at the threshold."""
         ahead = self.space.slope * (self.nearness(place) - self.threshold)
         return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -SUREST, SUREST))))
 
 
 def nearest(space: Space, prototypes: Mapping[str, Prototype], place: Array) -> Match | None:
-    """The best match of a place (K,), None where there are no prototypes."""
+    """The best match of a place (K,), None if there are no prototypes."""
     if not prototypes:
         return None
     each = tuple(prototypes.values())
@@ -137,7 +137,7 @@ def _values(told: Mapping[str, Any], key: str) -> Array:
 
 
 def clashes(prototypes: Mapping[str, Prototype], examples: Mapping[str, Array]) -> list[tuple[str, str]]:
-    """Pairs of gestures of which one of the (n, K) examples of the first would be taken for the second."""
+    """Pairs of gestures such that one of the first's examples, by its (n, K) places, would be taken for the second."""
     return [
         (name, other)
         for name, places in examples.items()

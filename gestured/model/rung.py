@@ -1,4 +1,4 @@
-"""One model of a ladder, and whether it can be used now."""
+"""A rung: one model of a ladder, and whether it can be used now."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ T = TypeVar("T")
 class Rung:
     """A model: open already, or a file that is opened when it is first needed.
 
-    A file that was refused is not looked at again before a reload: trying one may take seconds.
+    A file that was refused is not tried again before a reload, since that may take seconds.
     """
 
     def __init__(self, source: str | Path | Model) -> None:
@@ -24,7 +24,7 @@ class Rung:
         self.source = source.name if isinstance(source, Model) else source  # a file, or a shipped model's name
         self.name = Path(self.source).stem
         self.slow = 0  # runs in a row that took too long
-        self.aside_until = -math.inf  # s, on the clock of whoever puts it aside
+        self.aside_until = -math.inf  # s, on the ladder's clock
         self.refused: ModelError | None = None
 
     def open(self) -> Model:

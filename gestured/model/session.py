@@ -1,4 +1,4 @@
-"""A model's graph, opened and run by onnxruntime, which only this module and the lab import."""
+"""The session of a model: its graph, opened and run by onnxruntime, which only this module and the lab import."""
 
 import os
 import re
@@ -12,25 +12,25 @@ from gestured.model.limit import limited
 from gestured.model.metadata import Metadata
 
 FATAL = 4  # onnxruntime's severity below which it logs nothing
-LONGEST = 200  # characters of onnxruntime's errors that are passed on
+LONGEST = 200  # the most characters that are passed on of an error of onnxruntime's
 
 
 class Session:
     """One graph, whose inputs and outputs have names."""
 
     def __init__(self, data: bytes) -> None:
-        """Opens a file's bytes. ValueError where onnxruntime cannot."""
-        # Its Linux builds send telemetry otherwise, and only the environment before the import stops all of it.
+        """Open a file's bytes. Raises ValueError if onnxruntime cannot."""
+        # Only this variable, set before the import, stops all telemetry of onnxruntime's Linux builds.
         os.environ["ORT_DISABLE_TELEMETRY"] = "1"
         import onnxruntime
 
-        onnxruntime.set_default_logger_severity(FATAL)  # what is wrong comes as an exception; stderr is for the log
+        onnxruntime.set_default_logger_severity(FATAL)  # errors are raised, and stderr is for the log
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # else idle threads use up cores
         options.add_session_config_entry("session.load_model_format", "ONNX")  # refuse onnxruntime's own format
-        options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
+        options.enable_mem_reuse = False  # to plan it is slow, and makes no run faster or smaller
         options.log_severity_level = FATAL
         try:
             self._session: Any = onnxruntime.InferenceSession(
@@ -41,7 +41,7 @@ class Session:
         self.outputs: list[str] = [output.name for output in self._session.get_outputs()]
 
     def properties(self) -> dict[str, str]:
-        """The file's `metadata_props`; ValueError where they are no text."""
+        """The file's `metadata_props`. Raises ValueError if they are no text."""
         try:
             found: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         except UnicodeDecodeError:
@@ -49,7 +49,7 @@ class Session:
         return found
 
     def check(self, metadata: Metadata) -> str:
-        """The input's name, once names, types and shapes agree with the metadata; ValueError where they do not."""
+        """The input's name. Raises ValueError if names, types and shapes do not agree with the metadata."""
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
         names = [i.name for i in inputs]
         takes = "frames" if metadata.features is None else "features"
@@ -75,7 +75,7 @@ class Session:
             expected = shapes[value.name]
             if value.type != "tensor(float)":
                 raise ValueError(f"{value.name!r} is {value.type}, expected tensor(float)")
-            # What the file leaves open is a name or None; outputs are held to their size when it runs.
+            # A dimension that the file leaves open is a name or None. `Model.run` checks the sizes of outputs.
             loose = value.name not in names
             found = [d if isinstance(d, int) else None for d in value.shape]
             if len(found) != len(expected) or not all(
@@ -87,7 +87,7 @@ class Session:
     def run(
         self, names: Sequence[str], inputs: Mapping[str, NDArray[np.float32]], limit_s: float
     ) -> list[NDArray[np.float32]]:
-        """The graph's outputs of these names; ValueError where it fails, or takes longer than `limit_s`."""
+        """The graph's outputs of these names. Raises ValueError if it fails, or takes longer than `limit_s`."""
         import onnxruntime
 
         options = onnxruntime.RunOptions()

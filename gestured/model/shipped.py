@@ -1,6 +1,6 @@
-"""Where a model's file is: at a path, or beside the package under a shipped model's name; and its bytes.
+"""The files of models and their bytes: at a path, or beside the package under a shipped model's name.
 
-Whatever is wrong is one `ModelError`: the file, what is wrong, what was expected.
+Whatever is wrong is a `ModelError`, which names the file, what is wrong and what was expected.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best fi
 
 
 def shipped() -> dict[str, Path]:
-    """The models that come with the package, best first: name -> where its file belongs."""
+    """The models that come with the package, best first: by name, the path at which the file belongs."""
     return {name: _shipped_directory() / f"{name}.onnx" for name in LADDER}
 
 
@@ -28,17 +28,17 @@ def _shipped_directory() -> Path:
 
 
 def shipped_name(source: str | Path) -> str | None:
-    """The shipped model's name where `source` is one, by path or by name."""
+    """The shipped model's name if `source` is one, by path or by name; else None."""
     try:
         return _locate(source)[1]
     except ModelError:
-        return None  # whoever opens it is told why
+        return None  # the error is raised when the model is opened
 
 
 def _locate(source: str | Path) -> tuple[Path, str | None]:
-    """(path, the shipped model's name where it is one).
+    """(path, the shipped model's name if it is one, else None).
 
-    A text without a slash is a shipped model's name. With `.onnx` at its end it is a file, too, where there is one.
+    A text without a slash is a shipped model's name, unless it ends in `.onnx` and there is such a file.
     """
     path = Path(source)
     known = shipped()
@@ -60,9 +60,9 @@ def _locate(source: str | Path) -> tuple[Path, str | None]:
 
 
 def read(source: str | Path) -> tuple[Path, str | None, bytes, str]:
-    """(path, the shipped model's name where it is one, its bytes, their sha256).
+    """(path, the shipped model's name if it is one, its bytes, their sha256).
 
-    A shipped file is held against its manifest.
+    A shipped file must have the sha256 of the manifest. Raises ModelError.
     """
     path, name = _locate(source)
     with naming(path):
@@ -75,7 +75,7 @@ def read(source: str | Path) -> tuple[Path, str | None, bytes, str]:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Make a ModelError, which names the file, of a ValueError that says what is wrong with it."""
+    """Turn a ValueError that says what is wrong with a file into a ModelError that also names the file."""
     try:
         yield
     except ValueError as error:
@@ -83,7 +83,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def shipped_gestures(source: str | Path) -> tuple[str, ...]:
-    """The gestures of a shipped model whose file is sound, without opening it. Raises ModelError."""
+    """The gestures of a shipped model, by the manifest, if its file has the right sha256. Raises ModelError."""
     path, *_ = read(source)
     with naming(path):
         return tuple(_manifest(path, "gestures"))

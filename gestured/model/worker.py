@@ -1,4 +1,4 @@
-"""The child of `process`: opens a model and tests it, within bounds, and answers with a line of JSON."""
+"""The program of `process`'s child: it opens and tests a model within bounds, and answers with a line of JSON."""
 
 import json
 import resource
@@ -7,16 +7,16 @@ import sys
 from typing import Any
 
 BASE_BYTES = 192 << 20  # memory for Python, numpy, onnxruntime (some 80 MiB) and a small model
-BYTES_PER_BYTE = 4  # memory for each byte of the file: as read, as parsed, and its weights as onnxruntime has them
-START_S = 8  # seconds that starting may take, until the model's bytes are here
+BYTES_PER_BYTE = 4  # memory for each byte of the file: as read, as parsed, and as onnxruntime's weights
+START_S = 8  # the longest time until the model's bytes are here
 
 
 def main() -> None:
-    """Try the model on standard input, which begins with one byte, the seconds that this may take.
+    """Try the model on standard input, which begins with one byte: the seconds that this may take.
 
-    Only a process of its own may call this, since the kernel kills it when the time is over.
+    Only a process of its own may call this, since the kernel kills the process when the time is over.
     """
-    # The kernel ends us, whatever a thread of onnxruntime does: the alarm's own action is death.
+    # The alarm's default action ends the process, whatever a thread of onnxruntime does.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, [])
     signal.alarm(START_S)
