@@ -37,7 +37,7 @@ class Look(NamedTuple):
     raw: Array  # (N,) counts
     above: Array  # (N,) counts above the baseline
     activity: float  # noise units, of the strongest spot
-    sunken: bool  # a taxel lies clearly below its baseline, as after a hand that rested there when it was learned
+    sunken: bool  # a taxel lies clearly below its baseline, as after a hand that rested there while it was learned
     burst: bool  # a taxel lies deeper than textile swings after a contact, as after interference
     shifted: bool  # many taxels lie so deep; no touch does that: the sensor restarted, or a hand has left
 

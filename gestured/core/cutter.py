@@ -46,7 +46,7 @@ class Kept(NamedTuple):
 
 
 class Cutter:
-    """Keeps the frames of a contact and shortly before it, and makes segments of them."""
+    """The frames of a contact and shortly before it, and the segments that are made of them."""
 
     def __init__(self, conditioner: Conditioner, travel: float) -> None:
         """`travel`: taxel pitches that a finger may move and still be where it was."""
@@ -58,7 +58,7 @@ class Cutter:
         self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
         self._began: deque[float] = deque(maxlen=MOST_BEFORE)  # s, the onsets of the contacts in the last QUIET_S
         self._ended = -math.inf  # s, the end of the last contact
-        self._length_s = 0.0  # of the last contact
+        self._length_s = 0.0  # length of the last contact
         self.settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
         self.last_raw = b""  # raw counts of the last frame
         self.new = 0.0  # s, when the sensor first sent these counts
@@ -180,7 +180,7 @@ def clear(before: Sequence[Sight], after: Sequence[Sight], travel: float) -> boo
         came = max(math.dist(place, before[-1][1]) for _, place in before)
         return came >= 2 * travel and all(math.hypot(*way) < RESTS for way in ways)
     bends = [_turn(way, across) for way in ways if math.hypot(*way) >= RESTS]
-    one_way = len(bends) == 2 and bends[0] * bends[1] < 0  # it bends to one side on both sides of the hole
+    one_way = len(bends) == 2 and bends[0] * bends[1] < 0  # the way bends to the same side before and after the hole
     if not bends or max(map(abs, bends)) > (BENT if one_way else STRAIGHT):
         return False
     usual = sum(math.hypot(*way) for way in ways) / sum(side[-1][0] - side[0][0] for side in sides)

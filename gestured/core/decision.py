@@ -65,7 +65,7 @@ class Decision:
         return None if answer.points is None else answer.points[self._strictness]
 
     def is_own(self, match: Match | None, zone: str | None = None, *, known: bool) -> bool:
-        """Whether a segment is the user's own gesture `match`. `known`: the model is sure enough of one of its own."""
+        """Whether a segment is the user's own gesture `match`. `known`: the model alone is sure enough of its best."""
         if match is None or (known and not match.nearer) or not self.may(match.name, zone):
             return False
         return match.confidence >= self._thresholds.get(match.name, NEAR)

@@ -45,7 +45,7 @@ class Where:
 
     start: Place
     end: Place
-    way: float  # length of the path in sides of the shorter edge; 0 where it stayed within the noise
+    way: float  # length of the path in sides of the shorter edge; 0 if it stayed within the noise
     pressure: float  # counts of the strongest taxel above the idle sensor
     snr: float  # `pressure` over the noise
     contacts: int  # 1 or 2 fingers at the same time
@@ -69,7 +69,7 @@ class Gesture:
     lost: int  # frames that went missing between them
     model: str  # name of the model that answered
     degraded: bool  # whether a fallback answered
-    scores: Mapping[str, float]  # of each of the model's gestures that is in use
+    scores: Mapping[str, float]  # by gesture, for the model's gestures that are in use
     provisional: str | None = None
     own: bool = False  # whether it is a gesture of the user's own
     where: Where | None = None  # None only if nothing is known of it

@@ -151,7 +151,7 @@ class FrontEnd:
         cutter.trim(t)
         if segmenter.phase.touched:
             rests = conditioner.wide(look) or t - segmenter.rests.began >= PATIENCE_S
-            if conditioner.settle(t, raw, rests=True, restless=rests):  # what stays becomes the baseline's
+            if conditioner.settle(t, raw, rests=True, restless=rests):  # what rests there is in the baseline now
                 found += self._void("held")
         else:
             recovering = segmenter.after.recovering(t)
@@ -168,7 +168,7 @@ class FrontEnd:
         flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
         if self.conditioner.wide(look) and not flickering:
             if self.conditioner.settle(look.t, look.raw, rests=True, restless=True):
-                return self._void("held")  # an arm that lies still is no gesture, and something else may be
+                return self._void("held")  # an arm that lies still is no gesture, but a finger beside it may make one
         else:
             self.conditioner.idle.settling.clear()
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:

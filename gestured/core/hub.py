@@ -36,9 +36,8 @@ class Hub:
     def __init__(self, scene: Scene, classifier: Classifier, *, later: bool = False) -> None:
         """A hub without sensors yet. Raises ValueError if the `classifier` does not know a gesture of the scene.
 
-        With `later` the model runs only in `ask` and `look`, so that its runs do not delay the answers of other
-        sensors. A segment that nobody has asked about when its answer is due is asked about then, so the answers are
-        the same.
+        With `later`, most runs of the model wait for `ask` and `look`, so as not to delay answers of other sensors. A
+        segment that was not asked about when its answer is due is asked about then, so the answers are the same.
         """
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # by sensor without a place: its last sequence and id
@@ -56,7 +55,7 @@ class Hub:
         self._armed: dict[str, float] = {}  # by sensor that will come armed: until when, in s on the hub's clock
         self.gates = Gates(scene.gates)  # a change of the scene leaves the gates as they are
         self.asks: dict[str, Sensor] = {}  # sensors that wait for `ask`, the one that has waited longest first
-        self.looks: dict[str, Sensor] = {}  # the same for `look`
+        self.looks: dict[str, Sensor] = {}  # sensors that wait for `look`, in the same order
         self._set(scene, classifier)
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
@@ -148,10 +147,7 @@ class Hub:
         return facts
 
     def tick(self, now: float) -> list[Fact]:
-        """Do all that the time alone decides: `wait`, sensors that fell silent, gates and arming that have run out.
-
-        Everything that arrived until `now` must have been received before.
-        """
+        """Do what the time alone decides (`wait`, silences, gates, arming), after all that arrived until `now`."""
         facts = [] if now < self.gates.due else self._lapse(now)
         facts += self.wait(now)
         sensors = self._sensors.values()

@@ -47,7 +47,7 @@ class Idle:
         self.bare: tuple[Array, Array] | None = None
         self.settling = Settling()  # the frames that `settle` was offered
         self.followed: float | None = None  # s, the last idle frame; None after a contact or a silence
-        self.reviewed = 0.0  # s, when the noise was last looked at
+        self.reviewed = 0.0  # s, the last step of the noise
         self.learned = 1.0  # counts, `level` as it was learned
         self.quieter = 0  # the sum of the weights of the glances since the last frame that moved as was learned
         self.compared: Array = np.zeros(taxels)  # (N,) raw counts with which the next glance compares its own

@@ -21,10 +21,10 @@ class Arming:
     """The gesture that arms a sensor, and for how long. Raises ValueError, which names the field."""
 
     by: str
-    seconds: float = 5.0  # since the last gesture
+    seconds: float = 5.0  # the sensor stays armed for so long after the last gesture
 
     def __post_init__(self) -> None:
-        if not 0 < self.seconds <= LONGEST_S:  # so NaN is none
+        if not 0 < self.seconds <= LONGEST_S:  # NaN fails this, too
             raise ValueError(f"arming.seconds: expected more than 0, at most {LONGEST_S:g}, found {self.seconds!r}")
 
     @classmethod
@@ -117,8 +117,8 @@ class Gates:
     def __init__(self, start: Iterable[str] = ()) -> None:
         """`start`: the gates that are closed for all sensors from the beginning."""
         self._all: dict[str, float] = dict.fromkeys(start, math.inf)  # for sensors that are not in `_of`
-        self._of: dict[str, dict[str, float]] = {}  # by sensor, by name: when it opens by itself
-        self.due = math.inf  # when the next one opens by itself
+        self._of: dict[str, dict[str, float]] = {}  # by sensor, by name of a closed gate: when it opens by itself
+        self.due = math.inf  # when the next gate opens by itself
 
     def of(self, sensor: str | None) -> Mapping[str, float]:
         """By name of a closed gate: when it opens by itself; for a sensor, or (None) for each new one."""

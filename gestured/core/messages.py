@@ -132,10 +132,9 @@ class Subscription:
         return not self.types.isdisjoint(("provisional", "touch"))
 
     def matches(self, event: Event) -> bool:
-        """Whether the client wants to hear an event.
+        """Whether the client wants to hear an event; a filter lets events pass that have nothing to compare with it.
 
-        `sensors` filters events of one sensor, `gestures` those with a gesture's name, `zones` those with a place. A
-        filter lets all other events pass.
+        `sensors` filters events of one sensor, `gestures` those with a gesture's name, `zones` those with a place.
         """
         if event_type(event) not in self.types:
             return False

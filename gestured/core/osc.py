@@ -36,8 +36,7 @@ _SLOTTED = ("", "s", "r", "sr", "b", "sb")
 LAYOUTS_BYTES = 8 << 20  # memory for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
 SLOT_BYTES = 600  # memory that Python takes for a slot, without its head, address, type tags and scalars
 SCALAR_BYTES = 48  # memory that Python takes for a scalar in a slot
-# The bytes at which a packet's first head begins, enough for the whole of a short head. In a bundle the message's size
-# stands before the head.
+# The bytes at which a packet's first head begins (in a bundle, its message's size), enough for all of a short head.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
 _TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
@@ -62,7 +61,7 @@ class Message(NamedTuple):
 def timetag(data: bytes, at: int, end: int) -> float | None:
     """The time tag at byte `at` of a bundle that ends at `end`: s since the Unix epoch, None for "immediately".
 
-    Raises ProtocolError where the bundle has no room for it.
+    Raises ProtocolError if the bundle has no room for it.
     """
     if end - at < 8:
         raise ProtocolError("bundle", "a bundle without its time tag")
@@ -125,7 +124,7 @@ class Layouts:
         return len(self._known)
 
     def find(self, data: bytes) -> Layout | None:
-        """The layout of a packet, None where it is not known. The size that a blob gives is not compared."""
+        """The layout of a packet, None if it is not known. The size that a blob gives is not compared."""
         begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
         layout = self._known.get(begin) or self._known.get(_key(begin))
         if layout is None or layout.length != len(data):
@@ -142,7 +141,7 @@ class Layouts:
         return [known(begin) or known(_key(begin)) for begin in begins]
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
-        """The messages of a packet, None where its layout is not known."""
+        """The messages of a packet, None if its layout is not known."""
         layout = self.find(data)
         if layout is None:
             return None
@@ -251,7 +250,7 @@ def _bundle(data: bytes, messages: list[Message], slots: list[Slot], errors: lis
 def _message(
     data: bytes, begin: int, start: int, end: int, time: float | None, bundle: int, slots: list[Slot]
 ) -> Message:
-    """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
+    """The message at `start`; its size, if it has one, is at `begin`. Raises ProtocolError.
 
     If its arguments are of a kind in `_SLOTTED`, its slot is added to `slots`.
     """

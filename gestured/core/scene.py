@@ -47,17 +47,17 @@ AS_SCENE = Setup()
 class Scene:
     """All that decides what is recognised. Raises ValueError, which names the field, for a value out of range."""
 
-    gestures: tuple[str, ...]  # those in use, in the model's order
+    gestures: tuple[str, ...]  # the gestures in use, in the model's order
     grid: tuple[int, int]  # rows and columns of a sensor that has none of its own
     sensors: Mapping[str, Setup] = field(default_factory=dict)  # by name; a place is kept free for each of these
     addresses: Addresses = Addresses()
     clock: Clock = "arrival"
-    stale_s: float = 1.0  # of silence, after which a sensor counts as gone
+    stale_s: float = 1.0  # after so long a silence a sensor counts as gone
     tap_gap_s: float = Timing().tap_gap_s  # how long a tap waits for a second one
     max_sensors: int = 64
-    allow: tuple[Network, ...] = ()  # who may send; anybody where it is empty
+    allow: tuple[Network, ...] = ()  # networks whose hosts may send; all hosts may if it is empty
     thresholds: Mapping[str, float] = field(default_factory=dict)  # by gesture: confidences in place of the model's own
-    strictness: Strictness = USUAL  # the operating point of the model that answers, where `thresholds` says nothing
+    strictness: Strictness = USUAL  # the operating point of the answering model, for gestures without `thresholds`
     refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s for which it is not published again
     arming: Arming | None = None  # the gesture before which no other counts
     gates: tuple[str, ...] = ()  # the gates that are closed for every sensor when a hub begins

@@ -120,7 +120,7 @@ class Sensor:
         return self._late(t) + self._tell(self.front_end.flush(t))
 
     def reset(self) -> list[Told]:
-        """The sensor restarted: cancel what is open, learn the idle sensor anew."""
+        """The sensor restarted: cancel the open contact, and learn the idle sensor anew."""
         self.habits.clear()
         return self._tell(self.front_end.reset())
 
@@ -183,7 +183,7 @@ class Sensor:
         return asked[2:]
 
     def _decide(self, cut: Cut) -> list[Told]:
-        """The answer to a segment, and `Decided` where a classifier gave scores."""
+        """The answer to a segment, and `Decided` if a classifier gave scores."""
         name, segment, decision, listening = self.name, cut.segment, self._decision, self._listening
         answer, at = self._ask(segment)
         self._asked = self.shown = None
@@ -341,7 +341,7 @@ class Sensor:
         self.run(Sensor.reset, now, facts)
 
     def change(self, scene: Scene, classifier: Classifier, now: float, facts: list[Fact]) -> None:
-        """Go on in another scene; what was learned stays where it still holds."""
+        """Go on in another scene; what was learned stays if it still holds."""
         before, self._scene = self._scene, scene
         old, new = self.front_end, _front_end(self.name, scene)
         another_clock = scene.clock_of(self.name) != before.clock_of(self.name)

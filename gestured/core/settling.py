@@ -104,7 +104,7 @@ def _learned(stack: Array) -> Learned:
     step = quantum(stack, jumps)
     clipped = bool(np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * baseline.size)
     usual = _usual(jumps, clipped=clipped)
-    floor = calm = max(usual, step)  # counts, one standard deviation of the usual taxel, or one step where that is more
+    floor = calm = max(usual, step)  # counts, one standard deviation of the usual taxel, or one step if that is more
     if jumps[:half].size >= HALF_CHANGES:
         quieter = min(_usual(part, clipped=clipped) for part in (jumps[:half], jumps[half:]))
         calm = min(floor, HALVES * max(quieter, step))
@@ -123,7 +123,7 @@ def _learned(stack: Array) -> Learned:
 
 
 def _usual(jumps: Array, *, clipped: bool) -> float:
-    """Counts, the standard deviation of the usual taxel by (n, N) absolute changes; 0 where there were none."""
+    """Counts, the standard deviation of the usual taxel by (n, N) absolute changes; 0 if there were none."""
     rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
     return quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
 
@@ -133,7 +133,7 @@ def _without_spikes(stack: Array) -> Array:
     jumps = np.abs(np.diff(stack, axis=0))
     leaps = jumps.max(axis=1)
     quarter = len(leaps) // 4
-    usual = float(np.partition(leaps, quarter)[quarter])  # the lower quartile: a spike leaps there and back
+    usual = float(np.partition(leaps, quarter)[quarter])  # the lower quartile, since each spike makes two leaps
     good = np.abs(stack - median(stack)).max(axis=1) <= SPIKE * max(usual, quantum(stack, jumps))
     spikes = len(stack) - np.count_nonzero(good)
     return stack if not spikes or spikes > max(1, len(stack) // SPIKES_ONE_IN) else stack[good]

@@ -50,7 +50,7 @@ class Peak(NamedTuple):
     beside: Taxels  # the peak and the taxels next to it
     others: Taxels  # all taxels but those
     around: Taxels  # (n,) the taxels that are fitted
-    table: Array  # (n, W * SIDE * SIDE) their weights
+    table: Array  # (n, W * SIDE * SIDE) weights of these taxels
 
 
 def spots(frame: Array, shape: tuple[int, int], noise: float) -> list[Spot]:
@@ -86,7 +86,7 @@ def _peaks(frame: Array, shape: tuple[int, int], noise: float) -> tuple[Peak, Pe
     second = _peak(shape, first.others.item(at), REACH)
     between, _ = _pair(shape, first.taxel, second.taxel)
     if level < frame[second.beside].max() or frame[between].min() > VALLEY * level:
-        return first, None  # it is no peak, or no valley lies between it and the first
+        return first, None  # the second is no peak, or no valley lies between it and the first
     if max(abs(second.row - first.row), abs(second.column - first.column)) > APART:
         return first, second
     return _peak(shape, first.taxel, 1), _peak(shape, second.taxel, 1)

@@ -195,7 +195,7 @@ def bridged(frames: Array, bad: Mask) -> Array:
 
 
 def neighbour_mean(grid: NDArray[np.floating], good: Mask) -> Array:
-    """(..., R, C) -> the weighted mean of each taxel's neighbours, of the (R, C) good ones; 0 where none is good."""
+    """(..., R, C) -> the weighted mean of each taxel's neighbours, of the (R, C) good ones; 0 if none is good."""
     pad = [(0, 0)] * (grid.ndim - 2) + [(1, 1), (1, 1)]
     values = np.pad(np.where(good, grid, 0.0), pad)
     weight = np.pad(good.astype(float), 1)

@@ -12,7 +12,7 @@ SHARE = 0.05  # share of a new interval in the usual one: one late frame says li
 class Timing:
     """Durations in seconds. At 15 Hz they lie half-way between frames, so that jitter cannot flip a decision."""
 
-    release_s: float = 0.10  # after so long a quiet the finger is off
+    release_s: float = 0.10  # quiet after which the finger is off
     tap_gap_s: float = 0.50  # quiet in which a second tap may begin: gaps of up to 0.4 s, as seen at 15 Hz
     tap_s: float = 0.57  # a tap is at most this long
     tap_travel: float = 0.15  # a tap moves at most this share of the grid's shorter side

@@ -33,7 +33,7 @@ class Zone:
     """One zone of a sensor. Its right and top edges belong to it only where they are the sensor's own."""
 
     at: tuple[float, float, float, float]  # left, bottom, right, top: fractions of the sensor as a person sees it
-    gestures: tuple[str, ...] | None = None  # those that may begin here; None is all
+    gestures: tuple[str, ...] | None = None  # the gestures that may begin here; None is all
 
     def holds(self, place: Place) -> bool:
         """Whether a place lies in the zone."""
@@ -74,7 +74,7 @@ def _zone(name: str, told: Any) -> Zone:
     at: Any = parts.get("at")
     gestures: Any = parts.get("gestures")
     sound = isinstance(at, list | tuple) and len(at) == 4 and all(type(number) in (int, float) for number in at)
-    if not (sound and 0 <= at[0] < at[2] <= 1 and 0 <= at[1] < at[3] <= 1):  # so NaN is none
+    if not (sound and 0 <= at[0] < at[2] <= 1 and 0 <= at[1] < at[3] <= 1):  # NaN fails this, too
         expected = (
             "[left, bottom, right, top] in fractions of the sensor, 0 <= left < right <= 1 and bottom < top alike"
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 
-SAME_RATE = 0.12  # of the model's interval: frames so nearly as far apart are not interpolated, which would blur taps
+SAME_RATE = 0.12  # of the model's interval: if a sensor's differs by less, nothing is interpolated, which blurs taps
 SLACK = 0.25  # of the model's interval: a window is so much longer, since jitter must not decide whether a frame is in
 USED = 0.3  # of the most pressed row or column of a long sensor: rows or columns above that are part of the movement
 RIM = 2.0  # taxel pitches around the movement that are taken in with it, on both sides together

@@ -113,7 +113,7 @@ class _Route(NamedTuple):
     sensor: str
     grid: tuple[int, int] | None  # None for a trajectory
     counted: bool  # whether the frame's counter comes first
-    fault: tuple[str, str] | None  # reason and text of the ProtocolError, where the address or its type tags are wrong
+    fault: tuple[str, str] | None  # reason and text of the ProtocolError, if address or type tags are wrong
 
 
 class _Meaning(NamedTuple):
@@ -153,7 +153,7 @@ class Decoder:
         """
         errors: list[ProtocolError] = []
         arrivals: list[Arrival] = []
-        found: list[tuple[int, str, Arrival | tuple[Touch, ...]]] = []  # the bundle's number, the sensor
+        found: list[tuple[int, str, Arrival | tuple[Touch, ...]]] = []  # by message: bundle, sensor, content
         touched = bool(self._pending)
         for message in osc.decode(packet, errors, self._layouts):
             try:
@@ -250,7 +250,7 @@ class Decoder:
                 if len(self._pending) >= _MAX_PENDING:
                     self._pending.pop(next(iter(self._pending)))
                 self._pending[source, sensor] = touches[-1]
-            elif len(frames) == len(touches):  # one each, in whatever order
+            elif len(frames) == len(touches):  # each frame has its touches, in whatever order they came
                 for i, theirs in zip(frames, touches, strict=True):
                     arrivals[i] = arrivals[i]._replace(touches=theirs)
             else:
@@ -311,7 +311,7 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
     if route.counted:
         first = raw if slot.unpack is None else block[:, slot.scalars : slot.scalars + 4].view(">i4")
         counters = first[:, 0].astype(np.int64)
-    if slot.start:  # alone, a message begins at 0
+    if slot.start:  # outside of a bundle a message begins at 0
         tags = osc.timetags(block[:, 8:16])
     sensors = [meaning.route.sensor for meaning in meanings]
     read = Block(list(found), sensors, values.reshape(-1, *route.grid), counters, tags)

@@ -57,7 +57,7 @@ class Embedded:
     """
 
     def __init__(self, sensor: Sensor, gestures: tuple[str, ...]) -> None:
-        self.gestures = gestures  # in use, in the model's order
+        self.gestures = gestures  # the gestures in use, in the model's order, then the user's own
         self._sensor = sensor
         self._shape = sensor.front_end.grid_sent
         self._last = -math.inf  # s, the time of the last frame
@@ -84,7 +84,7 @@ class Embedded:
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = seconds
-        if not np.all(np.abs(frame) <= np.float64(LARGEST)):  # so NaN fails it, and no float16 cuts the bound
+        if not np.all(np.abs(frame) <= np.float64(LARGEST)):  # NaN fails this, too; a float16 could not hold the bound
             return []
         return events_of(self._sensor.push(Frame(seconds, frame, tuple(touches), lost)))
 
@@ -216,7 +216,7 @@ def _own(ladder: Ladder, path: Path) -> Own:
     found = own_file.load(path)
     if found.fault is not None:
         raise OwnFileError(found.fault)
-    if not found.sha256:  # a daemon makes the file that it was told; a program that names one expects its gestures
+    if not found.sha256:  # a daemon makes a file that is missing; a program that names one expects its gestures
         raise OwnFileError(f"{path}: cannot be read: {os.strerror(errno.ENOENT)}")
     if ladder.model.space is None and not ladder.degraded:
         raise SettingsError(f"own_gestures: {ladder.name} has no embedding, expected a model that was made for them")

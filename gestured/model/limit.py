@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-LOOK_S = 1.0  # the pause between two looks: shorter than the limit of a segment's run, which so never wakes the thread
+LOOK_S = 1.0  # the pause between two looks: shorter than a segment's limit, so that no such run wakes the thread
 AWAKE_S = 60.0  # the thread goes on looking for so long after the last run
 ASLEEP_S = 3600.0  # the pause if nothing was run for AWAKE_S; the next run ends it
 

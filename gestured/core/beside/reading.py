@@ -145,8 +145,7 @@ def view_of(front_end: FrontEnd, *, raw: bool) -> dict[str, Any] | None:
     """The last frame and what the segmenter makes of it, as JSON values; None before the first frame.
 
     Grids are row by row and as mounted, but `raw` is as sent. `values` are counts above the baseline with bad taxels
-    bridged, None before the baseline is learned. Activity is in noise units. The centroid is a row and a column, None
-    if nobody touches the sensor.
+    bridged, None before it is learned. Activity is in noise units; the centroid (row, column) is None without a touch.
     """
     shown, look, t = front_end.last_sent, front_end.look, front_end.pace.last
     if shown is None or t is None:
