@@ -2,8 +2,8 @@
 
 __version__ = "0.2.0"
 
-# Each name comes from its module when it is first used, so that importing the package imports nothing else. Type
-# checkers take this constant for true; typing's own would have to be imported.
+# Each name is imported from its module when it is first used, so that importing the package imports nothing else. Type
+# checkers take TYPE_CHECKING for true; the constant of `typing` would have to be imported.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from gestured.client.subscriber import Subscriber

@@ -2,7 +2,7 @@
 
 import os
 
-# Before numpy is imported: its BLAS starts a thread for every core otherwise, and no matrix here is large.
+# This must be set before numpy is imported: else its BLAS starts a thread for every core, and no matrix here is large.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Before pydantic is: it would search all packages for plugins, and load what it finds (logfire is one).
+# This must be set before pydantic is imported: else it loads the plugins of all installed packages, such as logfire.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

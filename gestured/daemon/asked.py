@@ -1,4 +1,4 @@
-"""What a configuration asks for: its models, opened; its destinations; its scene."""
+"""What a configuration asks for: its opened models, its destinations and its scene."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -25,13 +25,13 @@ from gestured.model.ladder import (
     require_gestures,
 )
 
-SLIP = 0.8  # of difflib's ratio: a name so near to a gesture of the model is taken for a slip of it
+SLIP = 0.8  # difflib's ratio from which a name counts as a misspelt gesture of the model
 
 
 class Output(NamedTuple):
     """A destination that the settings name, not opened yet."""
 
-    where: str  # as the settings name it
+    where: str  # the destination as the settings write it
     tells: str  # what is sent there, in words
     open: Callable[[Metrics], UdpOut]
 
@@ -47,14 +47,14 @@ class Asked:
 
 
 def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
-    """Open what may take long: models, and names of hosts. Raises as `open_ladder`."""
+    """Open the models and the destinations, which may take long. Raises ModelError or SettingsError."""
     ladder = open_ladder(settings, insist=insist)
     outputs = [output.open(metrics) for output in outputs_of(settings)]
     return Asked(settings, ladder, outputs, own_file.where(settings.own_gestures, os.environ))
 
 
 def outputs_of(settings: Settings) -> Iterator[Output]:
-    """Where events go besides the sockets: a daemon opens these, and `--explain` names them."""
+    """The destinations of events besides the sockets; a daemon opens them, and `--explain` names them."""
     early = settings.publish_provisional
     osc = f"gestures{' and provisional events' if early else ''}, and the status once a second"
     for one in settings.publish:
@@ -65,14 +65,14 @@ def outputs_of(settings: Settings) -> Iterator[Output]:
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
-    """Open and test the models. Raises ModelError, or SettingsError for gestures that they do not know.
+    """Open and test the models, and check the settings that depend on them. Raises ModelError or SettingsError.
 
-    With `insist` a fallback is not good enough: at a reload the model that runs already is better.
+    With `insist` a fallback is refused, since at a reload the model that already runs is better.
     """
     for one in settings.publish:
         if one.scheme == TUIO and not settings.touch:
             raise SettingsError(f"publish = {one}: it tells where fingers are, expected `touch = true` as well")
-    early: list[str] = []  # not logged yet: where opening fails in the end, the error says all of it
+    early: list[str] = []  # sentences that are logged only if opening succeeds, since else the error says them
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:
         raise ModelError("; ".join(early))
@@ -91,7 +91,7 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
 
 
 def _require_arming(settings: Settings, ladder: Ladder) -> None:
-    """Raises SettingsError where a gesture arms that can never come; a broken file of own gestures cannot tell."""
+    """Raises SettingsError for an arming gesture that can never come. A broken file of own gestures is not judged."""
     scene = scene_of(settings, ladder)
     if not set(scene.arming_gestures.values()) <= set(scene.gestures):
         own = own_file.load(own_file.where(settings.own_gestures, os.environ))

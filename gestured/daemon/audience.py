@@ -1,4 +1,4 @@
-"""Which clients hear an event."""
+"""The clients that receive an event, by their subscriptions."""
 
 from dataclasses import replace
 
@@ -9,21 +9,21 @@ from gestured.daemon.client import Client, Finger
 
 
 class Audience:
-    """Clients by their subscriptions: an event is held against each subscription once, however many share it.
+    """Clients by their subscriptions: an event is matched with each subscription once, however many clients share it.
 
-    Each `down` of a finger that a client is told of has exactly one `up`, whatever comes.
+    A client that is sent the `down` of a finger is also sent exactly one `up` of that finger.
     """
 
     def __init__(self) -> None:
         self._classes: dict[Subscription, set[Client]] = {}
-        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event
-        self._down: dict[Finger, tuple[Touch, set[Client]]] = {}  # fingers that are down, and who was told so
+        self._owed: dict[tuple[str, int], set[Client]] = {}  # by sensor and id: who was sent a provisional event
+        self._down: dict[Finger, tuple[Touch, set[Client]]] = {}  # fingers that are down: the last event, who follows
         self._epoch = 0.0
 
     def change(self, client: Client, subscription: Subscription) -> bool:
-        """Put a client with those that ask for the same. Returns whether nobody asks any more for what it asked for.
+        """Give a client a new subscription. Returns whether no client has the old one any more.
 
-        Fingers that it is to follow now are down, for it, and those that it no longer follows are up.
+        The client is sent a `down` for each finger that it follows from now on, and an `up` for each that it leaves.
         """
         last = self._leave(client)
         client.subscription = subscription
@@ -37,13 +37,13 @@ class Audience:
         return last
 
     def forget(self, client: Client) -> bool:
-        """A client is gone. Returns whether nobody asks any more for what it asked for."""
+        """Remove a client that is gone. Returns whether no client has its subscription any more."""
         for _, clients in self._down.values():
             clients.discard(client)
         return self._leave(client)
 
     def of(self, event: Event) -> list[Client]:
-        """The clients that hear an event: those who ask for it or were sent the provisional event that it answers."""
+        """The clients that receive an event: they ask for it, or were sent the provisional event that it answers."""
         wanted = [client for asked, clients in self._classes.items() if asked.matches(event) for client in clients]
         if isinstance(event, Provisional):
             self._owed[event.sensor, event.id] = set(wanted)
@@ -57,7 +57,7 @@ class Audience:
         return wanted
 
     def follow(self, event: Touch, epoch: float) -> None:
-        """Send an event of a finger to those who follow it: those who ask for it, from its `down` on."""
+        """Send an event of a finger to the clients that follow this finger, which begins with its `down`."""
         finger, self._epoch = (event.sensor, event.id, event.touch), epoch
         if event.phase == "down":
             clients = set(self.of(event))
@@ -70,7 +70,7 @@ class Audience:
             client.touch(event, epoch, line)
 
     def asked(self, kind: str) -> tuple[frozenset[str], bool]:
-        """The sensors whose events of a type somebody asks for by name, and whether somebody asks for all."""
+        """The sensors of which clients ask for that type of event by name, and whether a client asks for all."""
         named = [asked.sensors for asked in self._classes if kind in asked.types]
         return frozenset().union(*(names for names in named if names is not None)), None in named
 

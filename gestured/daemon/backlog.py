@@ -1,4 +1,4 @@
-"""Packets that wait for their turn, and who is served when more comes than can be done."""
+"""The backlog: packets that wait for their turn, and the choice among them if more come than can be served."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -10,18 +10,18 @@ from typing import NamedTuple
 from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
 
-TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
-LIGHT_BYTES = 4 << 10  # owners of sensors who send no more in a turn of a flood are served together
-GROUP, GROUP_BYTES = 256, 128 << 10  # packets, and bytes of several packets, in one go at the most
-ROOM_BYTES = 52 << 10  # a quarter of the smallest buffer that a kernel grants
-MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
-FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
+TOGETHER_S = 0.004  # packets that arrived so close to each other are served together
+LIGHT_BYTES = 4 << 10  # owners of sensors that send no more than this in a turn of a flood are served together
+GROUP, GROUP_BYTES = 256, 128 << 10  # the most packets that are served together, and the most bytes of several packets
+ROOM_BYTES = 52 << 10  # a quarter of the smallest receive buffer that a kernel grants
+MOST_BYTES = 32 << 20  # four times the kernel's buffer, which has twice the 4 MiB that we ask for
+FLOOD_S = 1.0  # s of work after which we check whether the backlog shrinks; also the shortest duration of a flood
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
-OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
-# s of work that a sender begins with, and may save up, for each sensor that it owns; a stranger for one. It is the
-# price of the largest packet of frames.
+OWNERS_SHARE = 0.75  # of the time in a flood goes to owners of sensors; strangers get the rest
+# s of work that a sender begins with, and may save up, for each sensor that it owns; a stranger has it once. The
+# largest packet of frames costs as much.
 CREDIT_S = 0.02
-FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
+FIRST_GUESS = 3e-7  # s of work for a byte, until a sender's packets have been measured
 NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
 REMEMBERED_SENDERS = 4096  # senders whose costs and credit are remembered in a flood
 
@@ -35,11 +35,11 @@ class Datagram(NamedTuple):
     arrival: float  # s, monotonic
     packet: bytes
     source: Source
-    cost: float  # s of work, probably; no more than anybody can save up, so that all are served in the end
+    cost: float  # s of work, estimated; no more than any sender can save up, so that none is never served
 
 
 class Group(NamedTuple):
-    """Packets that arrived together, as they are served in a flood: of one sender, or a few of each of several."""
+    """Packets that arrived together and are served together in a flood, of one sender or of several light ones."""
 
     packets: list[Packet]
     arrival: float  # s, monotonic, of the last of them
@@ -48,11 +48,11 @@ class Group(NamedTuple):
 class Backlog:
     """The packets that were read and not yet served, oldest first.
 
-    In a flood, work is shared out: in each turn every sender gets the same time, what one does not need goes to the
-    others, and what is too much is dropped, the oldest first. Owners of sensors who send little are served first, and
-    together, since a frame costs several times less beside others than alone; then who needs least. A source that owns
-    a sensor counts for itself and comes before strangers; all strangers of one host are one sender, however many ports
-    they open.
+    In a flood, work is shared out: in each turn every sender gets the same time, time that one does not need goes to
+    the others, and packets beyond a share are dropped, the oldest first. Owners of sensors that send little are served
+    first and together, since a frame costs several times less with others than alone; then the senders that need the
+    least time. A source that owns a sensor is a sender of its own, and gets its share before strangers; all strangers
+    of one host are one sender, however many ports they open.
     """
 
     def __init__(self, owned: Callable[[Source], int]) -> None:
@@ -61,7 +61,7 @@ class Backlog:
         self._packets: list[Packet] = []
         self._arrivals: list[float] = []  # s, of each
         self._bytes = 0
-        # Whether work catches up is measured from time to time: how much was done since, and how far that has led.
+        # `worked` compares from time to time how much work was done with how many seconds of arrivals that served.
         self._work = 0.0  # s of work on groups since the last measurement
         self._oldest = 0.0  # s, the arrival of the oldest packet at the last measurement
         self._until = 0.0  # s, when the flood is over unless packets are dropped before
@@ -75,16 +75,16 @@ class Backlog:
 
     @property
     def full(self) -> float:
-        """What waits, as a share of the packets that a read takes, or of ROOM_BYTES."""
+        """The waiting packets as a share of what a read takes, or their bytes as one of ROOM_BYTES, the larger one."""
         return max(len(self._packets) / GROUP, self._bytes / ROOM_BYTES)
 
     @property
     def oldest(self) -> float:
-        """When the oldest packet arrived, in s; infinite where none waits."""
+        """When the oldest packet arrived, in s; infinite if none waits."""
         return self._arrivals[0] if self._arrivals else math.inf
 
     def add(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> None:
-        """Let these wait, in the order of their arrival (s)."""
+        """Add packets in the order of their arrivals (s)."""
         if not self._packets and packets:
             self._work, self._oldest = 0.0, arrivals[0]
         self._packets += packets
@@ -92,7 +92,7 @@ class Backlog:
         self._bytes += sum([len(packet) for packet, _ in packets])
 
     def flooded(self, now: float) -> bool:
-        """Whether more packets come than can be served; costs and credit are forgotten where that is over."""
+        """Whether more packets come than can be served; if not, costs and credit are forgotten."""
         if self._bytes > MOST_BYTES or now < self._until:
             return True
         self._credit.clear()
@@ -100,11 +100,11 @@ class Backlog:
         return False
 
     def flood(self, until: float) -> None:
-        """Count what comes as a flood `until` then (s)."""
+        """Treat packets as a flood at least `until` then (s)."""
         self._until = max(self._until, until)
 
     def worked(self, seconds: float, now: float) -> None:
-        """Note that groups were served for so long (s): where that does not catch up with what comes, it is a flood."""
+        """Note `seconds` of work on groups; if the work does not catch up with the arrivals, it is a flood."""
         self._work += seconds
         if self._packets and self._work >= FLOOD_S:
             oldest = self.oldest
@@ -113,7 +113,7 @@ class Backlog:
             self._work, self._oldest = 0.0, oldest
 
     def group(self) -> tuple[list[Packet], float]:
-        """Take the oldest packets that arrived together, at least one; also when the last of them came, in s."""
+        """Take the oldest packets that arrived together, at least one, and the arrival of the last of them in s."""
         n = bisect_left(self._arrivals, self._arrivals[0] + TOGETHER_S, hi=min(GROUP, len(self._arrivals)))
         ends = list(accumulate([len(packet) for packet, _ in self._packets[:n]]))
         n = max(1, bisect_right(ends, GROUP_BYTES))
@@ -123,10 +123,10 @@ class Backlog:
         return found, arrival
 
     def share(self, seconds: float, now: float) -> tuple[list[Group], dict[Sender, list[bytes]]]:
-        """In a flood: what is to be served in a turn of so many seconds, and which packets of whom were dropped.
+        """The groups to serve in a turn of a flood that takes `seconds`, and by sender the packets that were dropped.
 
-        Nothing waits after it. A packet that costs more than a turn is served once so many turns have passed, since
-        while it is worked on, the kernel's buffer fills.
+        No packet waits afterwards. A packet that costs more than a turn is served only after as much time in turns,
+        since the kernel's buffer fills during the work on it.
         """
         by_sender: dict[Sender, list[Datagram]] = {}
         for (packet, source), arrival in zip(self._packets, self._arrivals, strict=True):
@@ -160,7 +160,7 @@ class Backlog:
         return _groups(sorted(light, key=attrgetter("arrival"))) + served, dropped
 
     def took(self, group: Group, seconds: float) -> None:
-        """A group of a flood was served, and cost so much."""
+        """Note that a group of a flood was served in `seconds`, which shows what its senders' packets cost."""
         size = sum([len(packet) for packet, _ in group.packets])
         cost = seconds / size if size else 0.0
         for key in {self.sender(source) for _, source in group.packets}:
@@ -169,7 +169,7 @@ class Backlog:
                 self._cost[key] = before + NEWEST * (cost - before)
 
     def sender(self, source: Source) -> Sender:
-        """As whom a source counts: for itself where it owns a sensor, else as its host."""
+        """The sender as which a source counts: the source itself if it owns a sensor, else its host."""
         return source if self._owned(source) else source[0]
 
     def _newest(
@@ -178,7 +178,7 @@ class Backlog:
         most = CREDIT_S * (self._owned(key) if isinstance(key, tuple) else 1)
         credit, equal = self._credit.get(key, (most, before))
         if isinstance(key, tuple):
-            credit += before - equal  # turns in which it sent nothing; a stranger that pauses has earned nothing
+            credit += before - equal  # for turns in which it sent nothing; a stranger earns nothing in a pause
         credit = min(credit + share, max(share, most))
         kept: list[Datagram] = []
         for datagram in reversed(datagrams):
@@ -195,7 +195,7 @@ class Backlog:
 
 
 def _groups(datagrams: Sequence[Datagram]) -> list[Group]:
-    """Datagrams, oldest first, in groups of those that arrived together."""
+    """The groups of datagrams that arrived together; `datagrams` are the oldest first."""
     groups: list[list[Datagram]] = []
     for datagram in datagrams:
         if not groups or datagram.arrival - groups[-1][0].arrival >= TOGETHER_S:
@@ -205,7 +205,7 @@ def _groups(datagrams: Sequence[Datagram]) -> list[Group]:
 
 
 def fair(needs: dict[Sender, float], seconds: float) -> dict[Sender, float]:
-    """Shares of a time for those who need some of it: the same for all, but nobody's unused rest is lost."""
+    """By sender, its share of `seconds`: the same for all, but time that one does not need goes to the others."""
     shares: dict[Sender, float] = {}
     left = seconds
     for n, (key, need) in enumerate(sorted(needs.items(), key=lambda item: item[1])):

@@ -1,4 +1,4 @@
-"""All sockets of one daemon: those that systemd passed, by their names, and those that it binds itself."""
+"""All sockets of one daemon: those that systemd passed, known by their names, and those that the daemon binds."""
 
 import os
 import socket
@@ -24,7 +24,7 @@ from gestured.daemon.sockets import (
 
 FIRST_FD = 3  # sd_listen_fds(3)
 INTERNET = (socket.AF_INET, socket.AF_INET6)
-# FileDescriptorName= -> what such a socket must be, in systemd's words
+# FileDescriptorName= -> families and type of such a socket, and the line of a systemd unit that makes it
 SOCKET_NAMES = {
     "osc": (INTERNET, socket.SOCK_DGRAM, "ListenDatagram=HOST:PORT"),
     "events": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
@@ -39,7 +39,7 @@ class Bound:
     """All sockets of a daemon, open until `close`."""
 
     udp: socket.socket
-    since: float  # s, monotonic: packets that waited in a socket from systemd count as if they came then
+    since: float  # s, monotonic: packets that waited in a socket from systemd count as arrived at this time
     events: Listener
     control: Listener
     gates: Listener | None
@@ -47,7 +47,7 @@ class Bound:
     close: Callable[[], None]  # closes all sockets, and removes the paths that we made for them
 
     def addresses(self) -> dict[str, str | None]:
-        """Where the daemon can be reached, from whatever folder."""
+        """The daemon's addresses by setting; their paths are valid in any folder."""
         return {
             "listen": name_of(self.udp),
             "socket": _from_anywhere(self.events.path),
@@ -58,12 +58,12 @@ class Bound:
 
 
 def _from_anywhere(path: Path) -> str:
-    """An absolute path as it is, a relative one as what it leads to: with its ".." it might exceed 107 bytes."""
+    """A path that is valid in any folder. A relative one is resolved: with its ".." it might exceed 107 bytes."""
     return str(path if path.is_absolute() else path.parent.resolve() / path.name)
 
 
 def bind_all(settings: Settings) -> Bound:
-    """Take what systemd passed and bind the rest. All or nothing; raises AddressError or SettingsError."""
+    """Take the sockets that systemd passed and bind the others, all or none. Raises AddressError or SettingsError."""
     given = _by_name(_passed())
     with ExitStack() as opened:
         for sock in given.values():
@@ -99,7 +99,7 @@ def bind_all(settings: Settings) -> Bound:
 def _listener(
     given: Mapping[str, socket.socket], name: str, path: Path | None, opened: ExitStack, *, key: str = ""
 ) -> Listener:
-    """What systemd passed under a name, else a socket at a path; `key` is the setting that an error names."""
+    """The socket that systemd passed as `name`, else a new one at `path`; `key` is the setting that an error names."""
     if name in given:
         return Listener(given[name])
     assert path is not None
@@ -111,7 +111,7 @@ def _listener(
 def _passed() -> list[tuple[str, socket.socket]]:
     """(name, socket) of each socket that systemd holds for us; names as FileDescriptorName= gives them.
 
-    It can be asked once: the variables are removed, so that no child takes them for its own.
+    It can be called once: it removes systemd's variables, so that no child process takes the sockets for its own.
     """
     mine = os.environ.pop("LISTEN_PID", "") == str(os.getpid())
     count, names = os.environ.pop("LISTEN_FDS", ""), os.environ.pop("LISTEN_FDNAMES", "").split(":")

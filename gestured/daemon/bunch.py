@@ -1,4 +1,4 @@
-"""Packets of a sensor that were held up on their way, as by Wi-Fi, and arrive right after each other."""
+"""Bunches: packets of a sensor that were held up on their way, as by Wi-Fi, and arrive right after each other."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -8,9 +8,9 @@ from typing import NamedTuple
 from gestured.core.owner import Source
 from gestured.daemon.backlog import GROUP_BYTES, TOGETHER_S, Packet
 
-QUIET_S = 0.2  # after so long without a packet of a source a bunch may come; a shorter pause is no hole in a contact
-MOST_S, MOST = 0.05, 128  # seconds that a bunch is waited for, and packets of a bunch, at the most
-REMEMBERED_SOURCES = 4096  # sources of which it is remembered when they were heard last
+QUIET_S = 0.2  # a bunch may come after so long a pause of its source; a shorter pause makes no hole in a contact
+MOST_S, MOST = 0.05, 128  # the most seconds that a bunch is held back, and the most packets of a bunch
+REMEMBERED_SOURCES = 4096  # sources whose last arrival is remembered
 
 
 class Bunch(NamedTuple):
@@ -21,40 +21,40 @@ class Bunch(NamedTuple):
 
     @property
     def over(self) -> float:
-        """When it is complete unless another packet comes before, in s."""
+        """When the bunch is complete unless another packet comes before, in s."""
         if len(self.packets) >= MOST or sum([len(packet) for packet, _ in self.packets]) >= GROUP_BYTES:
             return self.arrivals[0]
         return min(self.arrivals[-1] + TOGETHER_S, self.arrivals[0] + MOST_S)
 
 
 class Bunches:
-    """Holds back what comes after a pause for some milliseconds, until all that comes with it is there.
+    """Holds back packets that come after a pause for some milliseconds, until their bunch is complete.
 
-    Frames without a time of their own are dated by their arrival. What a way holds up arrives late, but in one bunch;
-    if its frames are given to the hub together, it spaces them at the sensor's usual rate, up to their arrival. Given
-    one by one, they would look like a hole in the contact, and then like frames at a much higher rate.
+    Frames without a time of their own are dated by their arrival. Packets that a network holds up arrive late, but in
+    one bunch. If the hub gets the frames of a bunch together, it spaces them at the sensor's usual rate, up to their
+    arrival. One by one, they would look like a hole in the contact, and then like frames at a much higher rate.
     """
 
     def __init__(self, owned: Callable[[Source], int]) -> None:
-        """`owned` says how many sensors a source owns; there is no waiting for a source that owns none."""
+        """`owned` says how many sensors a source owns; packets of a source that owns none are never held back."""
         self._owned = owned
         self._heard: dict[Source, float] = {}  # s, when each source was heard last
         self._held: dict[Source, Bunch] = {}
 
     @property
     def oldest(self) -> float:
-        """When the oldest packet that is held back came, in s; infinite where there is none."""
+        """When the oldest packet that is held back came, in s; infinite if there is none."""
         return min((bunch.arrivals[0] for bunch in self._held.values()), default=math.inf)
 
     @property
     def due(self) -> float:
-        """When the next bunch is complete unless more packets come before, in s; infinite where there is none."""
+        """When the next bunch is complete unless more packets come before, in s; infinite if there is none."""
         return min((bunch.over for bunch in self._held.values()), default=math.inf)
 
     def pick(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> tuple[list[Packet], list[float]]:
-        """Hold back the packets that belong to bunches; gives the others, and when they arrived (s).
+        """Hold back the packets that belong to bunches. Returns the others, and when they arrived (s).
 
-        Packets are given in the order of their `arrivals`.
+        Both `packets` and the others are in the order of their arrivals.
         """
         heard, held = self._heard, self._held
         if len(heard) > REMEMBERED_SOURCES:
@@ -64,7 +64,7 @@ class Bunches:
             source = packet[1]
             before = heard.get(source, arrival)
             heard[source] = arrival
-            if source in held and arrival > held[source].over:  # complete before this packet came, but read with it
+            if source in held and arrival > held[source].over:  # the bunch was complete before
                 complete = held.pop(source)
                 others += [(complete.arrivals[-1], one) for one in complete.packets]
             if source in held or (arrival - before >= QUIET_S and self._owned(source)):
@@ -77,7 +77,7 @@ class Bunches:
         return [packet for _, packet in others], [arrival for arrival, _ in others]
 
     def over(self, now: float) -> list[Bunch]:
-        """The bunches that are complete at `now` (s); those that ended together are one."""
+        """Take the bunches that are complete at `now` (s); those that lie within TOGETHER_S become one."""
         if now < self.due:
             return []
         complete = {source: bunch for source, bunch in self._held.items() if bunch.over <= now}

@@ -31,11 +31,11 @@ METAVARS = {
     "strictness": "|".join(STRICTNESS), "clock": "arrival|sensor",
     "allow": "CIDR", "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
 }  # fmt: skip
-OF_TYPE: dict[object, str] = {bool: "true|false", int: "N", float: "SECONDS"}  # where no key is named above
+OF_TYPE: dict[object, str] = {bool: "true|false", int: "N", float: "SECONDS"}  # for keys that METAVARS does not have
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags: one for each setting, described by the settings themselves."""
+    """The parser of the flags: one for each setting, with the description and the default of the setting."""
     from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
     flags = argparse.ArgumentParser(
@@ -67,13 +67,13 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `gestured`; returns the exit status."""
-    for number in range(3):  # a standard stream that was closed: nothing that is opened later may get its number
+    for number in range(3):  # no file that is opened later may get the number of a standard stream that is closed
         try:
             os.fstat(number)
         except OSError:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    # Until the loop takes signals: a stop is no failure, and a reload has nothing to reload yet. What takes long to
-    # import is imported below.
+    # Until the daemon has its own handlers, a stop is no failure, and a reload has nothing to reload. Modules that take
+    # long to import are imported only after this.
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: sys.exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -93,11 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.daemon.explain import explain as describe
 
             try:
-                # Python would try its own standard output again at exit, and a path may be no text.
+                # Not sys.stdout, which Python would flush again at exit; and it may be unable to encode a path.
                 with open(log.STDOUT, "w", errors="backslashreplace", closefd=False) as out:
                     print(describe(settings, sources), file=out)
             except BrokenPipeError:
-                pass  # its reader has enough, as `head` does
+                pass  # the reader has closed the pipe, as `head` does
             except OSError as error:
                 log.print_log(f"gestured: standard output cannot be written: {error.strerror}")
                 return 1

@@ -1,8 +1,8 @@
-"""A client of the event stream: its connection, what it asked for, and what waits for it.
+"""A client of the event stream: its connection, its subscription, and the lines that wait for it.
 
-A line is sent at once. What the client's socket does not take waits in a bounded backlog of its own, from which the
-oldest lines are dropped; the loop waits for nobody. Raw sockets instead of transports: a transport's buffer has no
-bound that drops the oldest.
+A line is sent at once. Lines that the client's socket does not take wait in a bounded backlog, from which the oldest
+are dropped; the loop waits for no client. The sockets are raw, since the buffer of an asyncio transport cannot drop its
+oldest lines.
 """
 
 import asyncio
@@ -19,10 +19,10 @@ from gestured.core.events import Touch
 from gestured.core.messages import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.metrics import Metrics
 
-BACKLOG_BYTES = 256 << 10  # the most bytes that wait for one client; one that is further behind loses the oldest lines
-READ_BYTES = 1024  # of one read; few, so that a client that sends rubbish waits its turn
-TURNS = 20  # reads and lines of one client in a second; more of them wait for the next second
-RUBBISH = 100  # bad lines without a good one between them after which a client is cut off: some seconds of nothing else
+BACKLOG_BYTES = 256 << 10  # the most bytes that wait for one client; beyond them the oldest lines are dropped
+READ_BYTES = 1024  # the most bytes of one read; few, so that a client that sends rubbish waits its turn
+TURNS = 20  # reads and answers of one client in a second; further ones wait for the next second
+RUBBISH = 100  # bad lines in a row after which a client is cut off; with TURNS they take some seconds
 
 Finger = tuple[str, int, int]  # sensor, id of the contact, number of the finger
 
@@ -32,40 +32,40 @@ class Server(Protocol):
 
     loop: asyncio.AbstractEventLoop
     metrics: Metrics
-    known: Callable[[], Mapping[str, Collection[str]]]  # the `gestures` and `zones` that a client may ask for
+    known: Callable[[], Mapping[str, Collection[str]]]  # `types`, `gestures`, `zones` that a client may name
 
     def subscribe(self, client: "Client", subscription: Subscription) -> None:
-        """Change what a client wants."""
+        """Change a client's subscription."""
 
     def queue(self, client: "Client") -> None:
-        """Have a client answer its next line when it is its turn."""
+        """Call `answer` of a client when it is its turn."""
 
     def check(self, client: "Client") -> None:
-        """Remove a client that has gone without a word."""
+        """Remove a client that has hung up unnoticed."""
 
     def cut_off(self, client: "Client", reason: str) -> None:
-        """Remove a client that is a burden."""
+        """Remove a client that misuses its connection; log the reason."""
 
     def remove(self, client: "Client") -> None:
         """Forget a client that is gone."""
 
 
 class Client:
-    """One connection: a socket, what it wants, and what waits for it."""
+    """One connection: a socket, its subscription, and the lines that wait for it."""
 
     def __init__(self, server: Server, sock: socket.socket) -> None:
         self._server, self.sock = server, sock
         self.subscription = Subscription()
-        self.blocked_since: float | None = None  # monotonic s, since when its socket takes nothing more
+        self.blocked_since: float | None = None  # monotonic s, since when its socket takes no bytes
         self.half_closed = False  # whether it will send no more, though it may go on reading
-        self._begun = b""  # rest of a line of which the client already has a part
+        self._begun = b""  # a line, or the rest of one, that is sent next and cannot be dropped
         self._waiting: deque[bytes] = deque()  # whole lines that come after `_begun`
         self._size = 0  # bytes of the lines in `_waiting`
-        self._moves: dict[Finger, tuple[Touch, float]] = {}  # by finger: how it moved since, and the epoch
-        self._lost = 0  # lines that were dropped, of which the client was not told so far
+        self._moves: dict[Finger, tuple[Touch, float]] = {}  # by finger: its waiting moves as one event, and the epoch
+        self._lost = 0  # dropped lines that the client has not been told of
         self.turns = TURNS  # turns that it has left in this second
         self._request = bytearray()  # a line that is not complete
-        self._asked: deque[bytes] = deque()  # lines that wait for an answer
+        self._asked: deque[bytes] = deque()  # requests that wait for an answer
         self._rubbish = 0  # bad lines since the last good one
 
     @property
@@ -85,7 +85,7 @@ class Client:
             self._server.loop.add_writer(self.sock, self.flush)
 
     def touch(self, event: Touch, epoch: float, line: bytes) -> None:
-        """Send a touch event, which `line` tells. Moves of a finger that wait are one: they displace nothing."""
+        """Send a touch event, whose JSON is `line`. Waiting moves of a finger become one event and displace no line."""
         key = event.sensor, event.id, event.touch
         if key in self._moves:
             before, _ = self._moves.pop(key)
@@ -97,7 +97,7 @@ class Client:
             self.send(line)
 
     def flush(self) -> None:
-        """Send what waits, as far as it goes."""
+        """Send what waits, as far as the socket takes it."""
         while self.sock.fileno() >= 0:
             if self._begun:
                 line, self._begun = self._begun, b""
@@ -113,12 +113,12 @@ class Client:
                 self._server.loop.remove_writer(self.sock)
                 return
             if (rest := self._write(line)) is not None:
-                self._begun = rest  # whole or in part: it goes first, and it is no longer dropped
+                self._begun = rest  # whole or in part, it is sent next and cannot be dropped
                 return
             self.blocked_since = time.monotonic()
 
     def read(self) -> None:
-        """Take requests; an end of file only means that no more will come. No more is read until they are answered."""
+        """Read requests, and no more until they are answered. After an end of file the client may still take events."""
         self._server.loop.remove_reader(self.sock)
         self.turns -= 1
         try:
@@ -146,7 +146,7 @@ class Client:
         self.go_on()
 
     def answer(self) -> None:
-        """Answer the oldest line that waits for it."""
+        """Answer the oldest request that waits."""
         self.turns -= 1
         try:
             self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.known()))
@@ -176,7 +176,7 @@ class Client:
             self._server.cut_off(self, "rubbish")
 
     def _write(self, line: bytes) -> bytes | None:
-        """What the socket did not take, or None if it took everything (or is gone)."""
+        """Send a line. Returns what the socket did not take, or None if it took everything (or is gone)."""
         try:
             sent = self.sock.send(line)
         except (BlockingIOError, InterruptedError):

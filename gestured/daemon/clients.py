@@ -21,14 +21,14 @@ CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BA
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 LINES = 16  # lines of all clients that are answered before the loop looks after its frames again
 ACCEPTED = 64  # connections that are accepted before the loop looks after its frames again
-DRAINED_S = 0.01  # at the end, the pause between two looks at what still waits
+DRAINED_S = 0.01  # at the end, the pause between two checks whether lines still wait
 
 
 class EventServer:
     """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events.
 
-    `known()` are the `gestures` and `zones` that a client may ask for; `changed()` is called when they ask for other
-    provisional or touch events.
+    `known()` are the `types`, `gestures` and `zones` that a client may name. `changed()` is called when the clients
+    ask for other provisional or touch events than before.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class EventServer:
         return sum(client.backlog for client in tuple(self._clients))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
+        """Send an event to the clients that receive it; it is encoded once, and only if there are any."""
         if isinstance(event, Touch):
             self.audience.follow(event, epoch)
             return
@@ -70,14 +70,14 @@ class EventServer:
             client.send(line)
 
     def tell(self, line: bytes) -> None:
-        """Send a line that is no event to every client, whatever it asks for."""
+        """Send a line that is no event to every client, whatever its subscription is."""
         for client in tuple(self._clients):
             client.send(line)
 
     def subscribe(self, client: Client, subscription: Subscription) -> None:
-        """Change what a client wants."""
+        """Change a client's subscription."""
         if client not in self._clients:
-            return  # it went while it was being answered
+            return  # the client went while it was being answered
         before = client.subscription
         if (self.audience.change(client, subscription) and before.costly) or subscription.costly:
             self._changed()
@@ -93,7 +93,7 @@ class EventServer:
             client.sock.close()
 
     def check(self, client: Client) -> None:
-        """Remove a client that has gone without a word, or has taken nothing for STALLED_S."""
+        """Remove a client that has hung up unnoticed, or has taken nothing for STALLED_S."""
         if client.half_closed:
             poll = select.poll()
             poll.register(client.sock, 0)
@@ -104,14 +104,14 @@ class EventServer:
             self.cut_off(client, "stalled")
 
     def cut_off(self, client: Client, reason: str) -> None:
-        """Remove a client that is a burden, and say so."""
+        """Remove a client that misuses its connection, count it and log the reason."""
         if client in self._clients:
             self.metrics.evicted.add(reason)
             self._throttle.warn("client cut off", reason)
             self.remove(client)
 
     def queue(self, client: Client) -> None:
-        """Answer a client's next line when it is its turn."""
+        """Call `answer` of a client when it is its turn."""
         self._queue.append(client)
         if len(self._queue) == 1:
             self.loop.call_soon(self._answer)
@@ -125,13 +125,13 @@ class EventServer:
                 client.answer()  # it may queue again, for a later turn
 
     def tick(self) -> None:
-        """Look after all clients; call it about once a second."""
+        """Check all clients, and give them their turns again; call it about once a second."""
         for client in tuple(self._clients):
             self.check(client)
             client.new_second()
 
     async def close(self, drain_s: float) -> None:
-        """Take no new clients, give the others `drain_s` seconds to read what waits, and end."""
+        """Accept no new clients, give the others `drain_s` seconds to read what waits for them, and hang up."""
         self.loop.remove_reader(self._listener)
         end = time.monotonic() + drain_s
         while any(client.backlog for client in self._clients) and time.monotonic() < end:
@@ -145,7 +145,7 @@ class EventServer:
                 sock, _ = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
-            except OSError as error:  # out of descriptors: the socket stays readable, so do not come back at once
+            except OSError as error:  # out of descriptors: the socket stays readable, so a pause is needed
                 self._throttle.warn("cannot accept a client", reason_of(error))
                 self.loop.remove_reader(self._listener)
                 self.loop.call_later(AGAIN_S, self.loop.add_reader, self._listener, self._accept)

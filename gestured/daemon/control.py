@@ -1,11 +1,11 @@
 """The control socket: one JSON object a line in, one JSON object a line out, for the daemon's owner and group.
 
-The bridges' socket for gates is another one of these, with verbs of its own, for whoever may open its file.
+The bridges' socket for gates has the same protocol, with verbs of its own, for whoever may open its file.
 
-A request is `{"verb": NAME, ...}`, checked as a whole before anything happens; what a verb takes stands in one
-table (`operations.verbs`). An answer is `{"ok": true, ...}` or `{"ok": false, "reason": "..."}`. Requests of one
-connection are answered one after the other, and those of all in turns between which the loop looks after its frames.
-The event socket knows none of this: it stays read-only.
+A request is `{"verb": NAME, ...}`, checked as a whole before anything changes; the signature of a verb's function says
+what it takes (`request.Verb`). An answer is `{"ok": true, ...}` or `{"ok": false, "reason": "..."}`. Requests of one
+connection are answered one after the other, and those of all connections in turns, between which the loop serves
+frames. The event socket has no verbs, and nobody can change anything through it.
 """
 
 import asyncio
@@ -32,20 +32,20 @@ from gestured.daemon.request import (
 
 OPERATORS = 16  # connections at a time
 OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out
-IDLE_S = 60.0  # an operator who asks nothing for so long, and is sent no stream, gives his place to others
-UNREAD_S = 10.0  # an operator who does not read an answer for so long is cut off
+IDLE_S = 60.0  # a connection without a request and without a stream is closed after so long
+UNREAD_S = 10.0  # a connection is cut off if an answer is not read for so long
 LOGGED = 8  # log lines of one verb and user in log.PERIOD_S; further ones are counted
 TURN_BYTES = 16 << 10  # bytes of a stream that are made in one turn: less than a millisecond's work
 TURN_PAUSE_S = 0.1  # the longest pause after a turn
-# From Python 3.13 on a server that closes removes its socket's path. Whoever made it does that; systemd's is to stay.
+# From Python 3.13 on, a server that closes removes its socket's path. Here whoever made the path does that.
 STAYS: dict[str, Any] = {"cleanup_socket": False} if sys.version_info >= (3, 13) else {}
 
 
 class ControlServer:
-    """Answers on a listening Unix socket. `start` before anything else."""
+    """Answers requests on a listening Unix socket; call `start` before anything else."""
 
     def __init__(self, sock: socket.socket, verbs: Mapping[str, Verb], *, guarded: bool = True) -> None:
-        """`guarded`: the account at the other end is looked at, too, and not only the rights of the socket's file."""
+        """`guarded`: whether the peer's account is checked, besides the permissions of the socket's file."""
         self._sock, self._verbs, self._guarded = sock, verbs, guarded
         self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
         self._open: dict[asyncio.StreamWriter, asyncio.Task[None] | None] = {}  # connections, each with its task
@@ -55,11 +55,11 @@ class ControlServer:
         self._quick, self._slow = asyncio.Lock(), asyncio.Lock()
 
     async def start(self) -> None:
-        """Take connections from now on."""
+        """Accept connections from now on."""
         self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES, **STAYS)
 
     def close(self) -> None:
-        """Hang up, and give up what was asked: what a verb looks at or changes may be closed from now on."""
+        """Hang up and cancel all requests, so that what verbs read or change may be closed from now on."""
         self._ended = True
         self._server.close()
         for writer, task in tuple(self._open.items()):
@@ -84,7 +84,7 @@ class ControlServer:
                     await self._answer_all(reader, writer, who)
                 finally:
                     self._served -= 1
-            if not writer.is_closing():  # uvloop knows no limits of what is closed
+            if not writer.is_closing():  # uvloop sets no limits on a closed transport
                 writer.transport.set_write_buffer_limits(0)
                 await _drain(writer)
         except (OSError, asyncio.CancelledError):
@@ -124,7 +124,7 @@ class ControlServer:
                 user = {"verb": name, "uid": who.uid, "pid": who.pid}
                 self._journal.info("control request", f"{name}, of uid {who.uid}", **user, **parameters)
         async with self._turn(self._slow if verb.slow else self._quick):
-            if connection.closed or self._ended:  # the operator left while this waited for its turn
+            if connection.closed or self._ended:  # the operator left while the request waited for its turn
                 return
             answer, lines = await self._run(connection, verb, parameters)
             _write(writer, json_line(answer))  # before the lines that the verb streams
@@ -165,7 +165,7 @@ class ControlServer:
 
     @asynccontextmanager
     async def _turn(self, lock: asyncio.Lock) -> AsyncIterator[None]:
-        """A turn of one operator. A pause of the same length follows: half of the loop's time is left to frames."""
+        """A turn of one operator, and a pause of the same length, so that half of the loop's time is left to frames."""
         async with lock:
             began = time.perf_counter()
             yield
@@ -173,13 +173,13 @@ class ControlServer:
 
 
 def _write(writer: asyncio.StreamWriter, line: bytes) -> None:
-    """Write to an operator, unless he has gone: uvloop raises RuntimeError for what is closed."""
+    """Write to a connection unless it is closed, for which uvloop would raise RuntimeError."""
     if not writer.is_closing():
         writer.write(line)
 
 
 async def _drain(writer: asyncio.StreamWriter) -> None:
-    """Wait until what was written is with the kernel; raises TimeoutError where nobody reads for UNREAD_S."""
+    """Wait until the kernel has all that was written. Raises TimeoutError if nobody reads for UNREAD_S."""
     try:
         async with asyncio.timeout(UNREAD_S):
             await writer.drain()

@@ -1,4 +1,4 @@
-"""What becomes of the hub's facts: events go to every sink, other facts are counted, logged and compared."""
+"""The desk for the hub's facts: events go to every sink, other facts are counted, logged and shown to observers."""
 
 import time
 from collections import Counter, deque
@@ -21,7 +21,7 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 
 
 class Desk:
-    """Takes the hub's facts, events that nobody performed, and what the reader of packets has dropped."""
+    """Takes the hub's facts, the events of tests, and the packets that the receiver has dropped."""
 
     def __init__(self, metrics: Metrics, shift: Shift, own: OwnGestures, views: Views, sinks: tuple[Sink, ...]) -> None:
         self._metrics, self._own, self._views = metrics, own, views
@@ -32,7 +32,7 @@ class Desk:
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
-        """Publish the events among the facts, then let those look on who act on none."""
+        """Publish the events among the facts, count and log the others, and show them to observers at last."""
         decided: list[Decided] = []
         for fact in facts:
             if isinstance(fact, Arrived):
@@ -55,7 +55,7 @@ class Desk:
         self._views.see(facts)
 
     def publish(self, event: Event, *, test: bool = False) -> None:
-        """Give an event to every sink, then count it. A `test` was made up, so it counts as no model's answer."""
+        """Give an event to every sink, then count it. A `test` is made up, so it is not counted as an answer."""
         epoch = time.time() - time.monotonic()
         for sink in self.sinks:
             try:
@@ -63,7 +63,7 @@ class Desk:
             except Exception as error:  # a bug in one sink must not keep the event from the others
                 self.bug(f"in the sink {type(sink).__name__}", error)
         if isinstance(event, Touch):
-            return  # up to 60 a second, which say nothing of what was answered
+            return  # touch events come up to 60 times a second and are no answers
         if not test:
             self._metrics.event(event)
             if isinstance(event, Gesture | Unknown):
@@ -82,7 +82,7 @@ class Desk:
         self._throttle.warn("dropped", reason, **{name: value for name, value in fields.items() if value})
 
     def muted(self, senders: Sequence[tuple[str, int] | str]) -> None:
-        """Say at a bounded rate that these senders of a flood are not heard for a while."""
+        """Log at a bounded rate that these senders of a flood are muted for a while."""
         names = [sender if isinstance(sender, str) else str(Address(*sender[:2])) for sender in senders]
         self._throttle.warn("senders of a flood are not heard for some seconds", "muted", senders=names)
 

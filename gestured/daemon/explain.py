@@ -50,7 +50,7 @@ def _models(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _own(settings: Settings, ladder: Ladder) -> Said:
-    """Which own gestures are loaded, or why the daemon goes on without them, and why none can be enrolled."""
+    """The own gestures that are loaded, or why there are none, and why none can be enrolled."""
     own = own_file.load(own_file.where(settings.own_gestures, os.environ))
     if own.fault or own.path is None:
         yield LEAVES, f"own gestures: {own.fault or own_file.NO_FILE}"
@@ -106,7 +106,7 @@ def _output(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _answers(settings: Settings, ladder: Ladder) -> Said:
-    """What is computed, how long an answer takes, and what is said before it."""
+    """What is computed for an answer, how long it takes, and which events come before it."""
     timing, metadata = scene_of(settings, ladder).timing, ladder.model.metadata
     rate_hz = metadata.window.rate_hz
 
@@ -142,7 +142,7 @@ def _answers(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _strictness(settings: Settings, ladder: Ladder) -> Said:
-    """Which operating points are taken, what each of them costs on each rung, and what holds before them."""
+    """The strictness, what each operating point costs on each rung, and the thresholds that take precedence."""
     own = (f", {name} {sensor.strictness}" for name, sensor in settings.sensors.items() if sensor.strictness)
     yield THRESHOLDS, f"strictness {settings.strictness}{''.join(own)}"
     arms = settings.arming or any(sensor.arming for sensor in settings.sensors.values())
@@ -177,7 +177,7 @@ def _left_out(settings: Settings, ladder: Ladder) -> Said:
 
 
 def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
-    """What was set, each key as the file has it, and by what."""
+    """Each key that was set, as its source writes it, and that source."""
     for key, source in sources.items():
         table = getattr(settings, key)
         title = TITLES.get(key, key)

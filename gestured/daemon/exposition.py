@@ -1,4 +1,4 @@
-"""All numbers of the daemon in Prometheus's text format, made where /metrics is asked for and nowhere else."""
+"""The exposition: all numbers of the daemon in Prometheus's text format, made only when /metrics is asked for."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from gestured.core.beside.reading import STATES
 from gestured.daemon.metrics import Counter, Histogram, Metrics
 
-Status = Mapping[str, Any]  # what `status` gives
+Status = Mapping[str, Any]  # what `status.status` returns
 
 
 def exposition(metrics: Metrics, status: Status) -> bytes:
@@ -18,7 +18,7 @@ def exposition(metrics: Metrics, status: Status) -> bytes:
     return generate_latest(registry)
 
 
-# Figures of each sensor. Sensors that share a label show one figure: the worst of theirs, or the sum of bad taxels.
+# Figures by sensor. Sensors that share a label show one figure: the worst among them, or the sum of bad taxels.
 _OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], str], ...] = (
     ("gestured_sensor_rate_hertz", "Frames a second", min, "rate_hz"),
     ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", max, "jitter_s"),

@@ -1,4 +1,4 @@
-"""Gates that are closed and opened while the daemon runs: verbs of the control socket, and of the bridges' own."""
+"""The gatekeeper: verbs that close and open gates, for the control socket and for the bridges' socket."""
 
 import math
 import time
@@ -17,7 +17,7 @@ from gestured.daemon.values import BridgeName, GateName, SensorName
 
 BRIDGES_GATES = MOST_GATES // 2  # gates that bridges may keep closed at a time, so that names are left for an operator
 LOGGED = 8  # log lines of one bridge in log.PERIOD_S; further ones are counted
-LONGEST_S = 1e9  # for which a gate may be closed; some thirty years
+LONGEST_S = 1e9  # the longest time for which a gate may be closed; some thirty years
 
 Sensor = SensorName | None
 Seconds = Annotated[float, Field(gt=0, le=LONGEST_S)]
@@ -28,18 +28,18 @@ class Gatekeeper:
 
     def __init__(self, hub: Hub, desk: Desk) -> None:
         self._hub, self._desk, self._throttle = hub, desk, Throttle(burst=LOGGED)
-        self._owed: dict[tuple[str, str | None], float] = {}  # gate, sensor: monotonic s of its bridge's sign of life
+        self._owed: dict[tuple[str, str | None], float] = {}  # by gate, sensor: monotonic s, when its bridge is overdue
 
     def verbs(self) -> dict[str, Verb]:
         """Name -> verb, for operators."""
         return {"inhibit": Verb(self.inhibit), "allow": Verb(self.allow)}
 
     def of_bridges(self) -> dict[str, Verb]:
-        """Name -> verb, for bridges: all that they can do. Their signs of life are no changes, and not logged."""
+        """Name -> verb, for bridges, which can do nothing else. They repeat these often, so no request is logged."""
         return {"inhibit": Verb(self.keep_closed, changes=False), "allow": Verb(self.open_again, changes=False)}
 
     def overdue(self, now: float) -> dict[str, float]:
-        """By gate that a bridge has closed and that is still closed: for how many s its bridge is overdue."""
+        """By gate that is still closed by a bridge: for how many s this bridge is overdue, if it is."""
         owed: dict[str, float] = {}
         for (gate, sensor), due in tuple(self._owed.items()):
             if now > due and gate in self._hub.gates.of(sensor):
@@ -49,17 +49,17 @@ class Gatekeeper:
     async def inhibit(
         self, connection: Connection, gate: GateName, sensor: Sensor = None, seconds: Seconds | None = None
     ) -> Reply:
-        """Close a gate for a sensor, or for all and all that come; for some seconds, or until it is allowed."""
+        """Close a gate for one sensor, or for all present and future ones; for some seconds, or until it is allowed."""
         return self._close(gate, sensor, seconds or math.inf)
 
     async def allow(self, connection: Connection, gate: GateName, sensor: Sensor = None) -> Reply:
-        """Open a gate for a sensor, or for all; one that is open stays so."""
+        """Open a gate for one sensor, or for all; a gate that is open stays open."""
         return self._open(gate, sensor)
 
     async def keep_closed(
         self, connection: Connection, bridge: BridgeName, gate: GateName, seconds: Seconds, sensor: Sensor = None
     ) -> Reply:
-        """Close a bridge's gate until it is allowed; within the seconds the bridge says so again, or it is overdue."""
+        """Close a bridge's gate until it is allowed; a bridge that does not repeat this within `seconds` is overdue."""
         _require_own(gate, bridge)
         named, theirs = self._hub.gates.named, {name for name, _ in self._owed}
         if gate not in named and len(named & theirs) >= BRIDGES_GATES:
@@ -88,7 +88,7 @@ class Gatekeeper:
         return self._done(self._hub.allow(sensor, gate, time.monotonic()), gate, sensor, bridge)
 
     def _require_known(self, sensor: str | None) -> None:
-        """Raises Refusal for a sensor that was not heard, and is not configured."""
+        """Raises Refusal for a sensor that was not heard and is not in the configuration."""
         if sensor is not None and not self._hub.knows(sensor):
             known = ", ".join(self._hub.readings(time.monotonic()))
             raise Refusal(
@@ -96,7 +96,7 @@ class Gatekeeper:
             )
 
     def _done(self, facts: Sequence[Fact], gate: str, sensor: str | None, bridge: str) -> Reply:
-        """What is closed now, of the sensors that were meant."""
+        """Publish the facts of a change; the reply says which gates of the sensors in question are closed now."""
         self._desk.take(facts)
         names = self._hub.readings(time.monotonic()) if sensor is None else [sensor]
         closed = {name: sorted(self._hub.gates.of(name)) for name in names}

@@ -1,8 +1,8 @@
-"""How the daemon itself is: whether its loop turns and how late, and what systemd's watchdog may be told."""
+"""The health of the daemon itself: whether its loop turns, how late it is, and whether systemd's watchdog is fed."""
 
 import os
 import time
-from random import Random  # nothing else in the daemon needs numpy's own, which is large
+from random import Random  # numpy.random is large, and nothing else in the daemon needs it
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gestured.daemon.desk import Desk
 
 TICK_S = 0.25  # the longest pause between two turns of the loop
 FADING = 0.95  # share of the lag that is kept each tick, so that half of it is gone in about four seconds
-CANARY_TAXELS = 4  # rows, and as many columns, of the canary's grid
+CANARY_TAXELS = 4  # rows of the canary's grid, and columns
 
 
 class Pulse:
@@ -23,7 +23,7 @@ class Pulse:
         self._lag = 0.0
 
     def woke(self, late_s: float) -> None:
-        """The loop came round, `late_s` s later than it wanted to."""
+        """Note that the loop came round, `late_s` s later than planned."""
         self.beat = time.monotonic()
         self._lag = max(late_s, FADING * self._lag)
 
@@ -34,12 +34,12 @@ class Pulse:
 
     @property
     def lag_s(self) -> float:
-        """How late the loop is, in s: the worst of late, or how long it has been hanging."""
+        """How late the loop is, in s: the worst recent delay, or the time for which it has been hanging."""
         return max(self._lag, self.age_s - TICK_S)
 
 
 def watchdog_period() -> float | None:
-    """Seconds between two WATCHDOG=1, a third of what systemd allows; None where it does not watch."""
+    """Seconds between two WATCHDOG=1, a third of what systemd allows; None if it does not watch us."""
     microseconds = os.environ.get("WATCHDOG_USEC", "")
     if not microseconds.isdigit() or os.environ.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return None
@@ -47,10 +47,10 @@ def watchdog_period() -> float | None:
 
 
 class Canary:
-    """A sensor that does not exist, on which the way of a frame is tried before systemd's watchdog is told anything.
+    """An artificial sensor, with which a front end is tested each time before systemd's watchdog is fed.
 
-    Its front end and its time are its own. No model is asked: one that hangs does so in the loop, which then feeds no
-    watchdog either.
+    Its front end and its time are its own. It runs no model: a model that hangs stops the loop, and then nothing feeds
+    the watchdog either.
     """
 
     def __init__(self, desk: Desk) -> None:
@@ -60,12 +60,12 @@ class Canary:
         self._t = 0.0
 
     def sings(self) -> bool:
-        """Whether a frame came through. A failure is logged and counted; systemd restarts us if it lasts."""
+        """Whether the front end takes a frame. A failure is logged and counted; systemd restarts us if it lasts."""
         self._t += 0.1
         try:
             values = np.array([self._random.gauss(100.0, 1.0) for _ in range(CANARY_TAXELS * CANARY_TAXELS)])
             self._front_end.push(Frame(self._t, values.reshape(CANARY_TAXELS, CANARY_TAXELS)))
-        except Exception:  # what fails for this frame fails for every sensor's
+        except Exception:  # what fails for this frame also fails for those of real sensors
             self._desk.bug("in the way of the watchdog's frame")
             return False
         return True

@@ -1,8 +1,8 @@
-"""/metrics, /healthz and /readyz, from a thread with an event loop of its own.
+"""The pages /metrics, /healthz and /readyz, served by a thread with an event loop of its own.
 
-So these pages answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
-and a bounded request; where there are too many, the oldest is closed, so that slow clients hold up nobody.
-This module is loaded only where `--metrics` is set.
+So these pages answer even if the daemon's loop hangs, and /healthz says 503 then. A connection has DEADLINE_S in all
+and a bounded request; if there are too many connections, the oldest is closed, so that slow clients hold up nobody.
+This module is loaded only if `metrics` is set.
 """
 
 import asyncio
@@ -20,10 +20,10 @@ from gestured.daemon.parts import Parts
 from gestured.daemon.sockets import AGAIN_S, AddressError, reason_of
 from gestured.daemon.status import healthy, status
 
-DEADLINE_S = 5.0  # for a connection, from its start to its answer
+DEADLINE_S = 5.0  # for a connection, from its beginning to the end of its answer
 REQUEST_BYTES = 8192  # of a request's head, at most
 HTTP_CONNECTIONS = 64  # at a time
-REST = 4  # seconds that we let pass for each one that was worked for those who ask
+REST = 4  # seconds of pause for each second of work on connections
 
 Response = tuple[int, str, bytes]  # status, content type, body
 
@@ -34,7 +34,7 @@ def as_json(status: int, body: Mapping[str, object]) -> Response:
 
 
 def serve_pages(sock: socket.socket, parts: Parts) -> "HttpThread":
-    """Serve the daemon's pages on a listening socket; each request asks how the daemon is by itself."""
+    """Serve the daemon's pages on a listening socket; each request reads the daemon's state anew."""
 
     def metrics() -> Response:
         return 200, "text/plain; version=0.0.4; charset=utf-8", exposition(parts.metrics, status(parts))
@@ -53,7 +53,7 @@ def serve_pages(sock: socket.socket, parts: Parts) -> "HttpThread":
 class HttpThread:
     """Serves GET and HEAD of `routes` (path -> function that makes the answer) on a listening socket.
 
-    Raises AddressError where it cannot, because there are too few descriptors for its loop.
+    Raises AddressError if there are too few descriptors for its loop.
     """
 
     def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Response]]) -> None:
@@ -84,10 +84,10 @@ class HttpThread:
         self._sock.close()
 
     async def _accept(self) -> None:
-        """Take connections. asyncio's own server tries again a hundred times at once where it has no descriptor.
+        """Accept connections. asyncio's own server is not used: without a descriptor it retries a hundred times.
 
-        After each one there is a pause in which the loop's thread has the interpreter, so that whoever asks without
-        end makes no answer about a gesture late.
+        After each connection there is a pause in which the daemon's thread has the interpreter, so that no number of
+        requests delays an answer about a gesture.
         """
         spent = time.thread_time()
         while True:
@@ -116,7 +116,7 @@ class HttpThread:
                 writer.write(self._answer(head))
                 await writer.drain()
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError):
-            pass  # the client was too slow, too long or is gone, or the daemon ends: no answer
+            pass  # the client was too slow, asked too much or is gone, or the daemon ends: no answer
         finally:
             self._open.pop(writer, None)
             writer.transport.abort() if writer.transport.get_write_buffer_size() else writer.close()

@@ -1,4 +1,4 @@
-"""Which daemon writes the file of the user's own gestures: the first one that locks it, and that one alone."""
+"""The keeper of the file of the user's own gestures: only the first daemon that locks the file writes it."""
 
 import fcntl
 import os
@@ -17,24 +17,24 @@ PID_DIGITS = 10  # of the process number in the lock, at most
 class Keeper:
     """One path, what was found there, and the lock beside it from the first success of `hold` on.
 
-    The lock is a file of its own, since each write puts another file into the place of the one that is kept. One thread
-    at a time may use a keeper.
+    The lock is a file of its own, since each write replaces the file of gestures. One thread at a time may use a
+    keeper.
     """
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        self.found = OwnFile(path, {})  # by `read`, or by what was written since
-        self.unkept: str | None = None  # why nothing can be written, as far as that was tried
+        self.found = OwnFile(path, {})  # by `read`, or what was written since
+        self.unkept: str | None = None  # why the lock was not had; None if it was, or was not tried
         self._lock: BinaryIO | None = None
 
     @property
     def fault(self) -> str | None:
-        """Why the file cannot be read, or written."""
+        """Why the file cannot be read, or cannot be written; None if no fault is known."""
         return self.found.fault or self.unkept
 
     def read(self) -> None:
-        """Read the file, and lock it where its folder is there: who enrols nothing needs none."""
-        if self.path is not None and os.path.isdir(self.path.parent):  # Path.is_dir raises where we may not look
+        """Read the file, and lock it if its folder exists; whoever enrols nothing needs no folder."""
+        if self.path is not None and os.path.isdir(self.path.parent):  # Path.is_dir raises if we may not look
             try:
                 self.hold()
             except OwnFileError as error:
@@ -88,7 +88,7 @@ class Keeper:
         )
 
     def close(self) -> None:
-        """Let go of the lock, so that another daemon may write the file."""
+        """Release the lock, so that another daemon may write the file."""
         if self._lock is not None:
             self._lock.close()
             self._lock = None

@@ -1,6 +1,6 @@
-"""Logs go to standard error: readable at a terminal, JSON otherwise. Nothing is logged per packet.
+"""The log, on standard error: readable at a terminal, JSON otherwise. Nothing is logged per packet.
 
-A thread of its own writes, so that a reader who has stopped reading holds up neither the loop nor the end.
+A thread of its own writes it, so that a reader who has stopped reading holds up neither the loop nor the daemon's end.
 """
 
 import math
@@ -16,8 +16,8 @@ from typing import Any
 
 import structlog
 
-PERIOD_S = 10.0  # the time in which lines of one reason are bounded
-REASONS = 64  # more than there are; a bound in case a peer can choose one of them
+PERIOD_S = 10.0  # the period in which the number of lines of one reason is bounded
+REASONS = 64  # more than there are; a bound in case a peer can choose a reason
 WAITING_BYTES = 256 << 10  # bytes of lines that wait for a reader at most; later lines are thrown away, and counted
 LAST_S = 0.5  # how long the end waits for a reader to take the last lines
 STDOUT, STDERR = 1, 2
@@ -41,9 +41,9 @@ def configure(level: str) -> None:
 
 
 class LineWriter:
-    """Writes lines to a descriptor, in their order, without making anybody wait.
+    """Writes lines to a descriptor, in their order; no caller waits.
 
-    A thread, because the descriptor is shared: one that we made non-blocking would be so for the shell that started us.
+    It uses a thread, since the descriptor is shared: made non-blocking, it would be so for the shell that started us.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -57,18 +57,18 @@ class LineWriter:
         self._thread.start()
 
     def put(self, line: str) -> None:
-        """Have a line written, or count it as lost where too much waits already."""
+        """Have a line written, or count it as lost if too much waits already."""
         data = line.encode(errors="backslashreplace") + b"\n"
         with self._changed:
             if self._lost or self._size + len(data) > WAITING_BYTES:
-                self._lost += 1  # so are later lines, until their number is logged, at the place where they are missing
+                self._lost += 1  # later lines are lost, too, until their number is logged in the place of all of them
             else:
                 self._lines.append(data)
                 self._size += len(data)
                 self._changed.notify()
 
     def close(self) -> None:
-        """Take no more lines and end, once all are written; waits LAST_S for that, not longer."""
+        """Take no more lines, and wait at most LAST_S until all are written."""
         with self._changed:
             self._closed = True
             self._changed.notify()
@@ -105,10 +105,10 @@ _errors: LineWriter | None = None
 
 
 def print_log(line: str) -> None:
-    """Have a line written to standard error, where there is one; no more once the interpreter ends.
+    """Have a line written to standard error, if there is one; nothing is written once the interpreter is ending.
 
-    What is collected then may have something to say, but a thread that is started then never runs, and who starts it
-    waits for ever.
+    Objects that are collected then may still log, but a thread that is started then never runs, and its starter waits
+    forever.
     """
     global _errors
     if sys.stderr is not None and not sys.is_finalizing():
@@ -117,7 +117,7 @@ def print_log(line: str) -> None:
 
 
 def print_line(line: str) -> None:
-    """Write one line to standard output, where there is one; waits LAST_S for a reader, not longer."""
+    """Write one line to standard output, if there is one; waits at most LAST_S for a reader."""
     if sys.stdout is not None:
         writer = LineWriter(STDOUT)
         writer.put(line)
@@ -125,7 +125,7 @@ def print_line(line: str) -> None:
 
 
 def close() -> None:
-    """Give the log's reader LAST_S to take the last lines. A later line opens it again."""
+    """Give the log's reader LAST_S to take the last lines. A later line opens the log again."""
     global _errors
     if _errors is not None:
         _errors.close()
@@ -145,7 +145,7 @@ log: Any = structlog.get_logger()
 
 
 class Throttle:
-    """Say the first ones of each reason at once, then nothing until PERIOD_S are over, and then how many there were."""
+    """Logs the first lines of each reason at once, and counts further ones; a line after PERIOD_S has the count."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, burst: int = 1) -> None:
         """`burst` is how many lines of one reason there are in PERIOD_S."""

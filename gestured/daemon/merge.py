@@ -1,8 +1,8 @@
-"""Where settings come from, and what is said when they are wrong.
+"""The sources of settings, merged, and the errors for settings that are wrong.
 
-Flags win over `GESTURED_*` in the environment, that over the TOML file, that over the defaults. The three are
-merged first and validated once, as a whole; an error names the key, the value, where it came from and what
-was expected. pydantic-settings would do the merging for 105 ms more at every start.
+Flags win over variables `GESTURED_*`, variables over the TOML file, and the file over the defaults. All are merged
+first and validated once, as a whole; an error names the key, the value, its source and what was expected.
+pydantic-settings would merge them as well, but take 105 ms more at every start.
 """
 
 import errno
@@ -19,9 +19,9 @@ from gestured.record.files import open_regular
 
 ENVIRONMENT = "GESTURED_"
 KEYS = (*FLAGS, "config")  # settings that a variable can set
-# Kubernetes and Docker tell every container of every service: GESTURED_SERVICE_HOST, GESTURED_PORT_9000_UDP_ADDR.
+# Variables by which Kubernetes and Docker tell containers of a service, such as GESTURED_PORT_9000_UDP_ADDR.
 SERVICE = re.compile(r"GESTURED_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(ADDR|PORT|PROTO))?)")
-PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # set by a platform where its value is a URL, as tcp://10.96.0.17:9000
+PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # set by a platform if its value is a URL, such as tcp://10.96.0.17:9000
 MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
 
 
@@ -39,7 +39,7 @@ def _from_file(path: str) -> dict[str, Any]:
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
     except (ValueError, RecursionError) as error:  # bad bytes, syntax, or a number of thousands of digits
         raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
-    for name in TITLES.keys() & found.keys():  # our own name for tables, no key of the file's
+    for name in TITLES.keys() & found.keys():  # our own names for tables are no keys of the file
         raise SettingsError(f"{name} ({path}): unknown key, expected [{TITLES[name]}]")
     if isinstance(found.get("gestures"), dict):
         tables = found.pop("gestures")
@@ -54,9 +54,9 @@ def _from_file(path: str) -> dict[str, Any]:
 
 
 def from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-    """Values by key of the variables that are set and not empty, and names of those that are no settings.
+    """By key, the values of variables that are set and not empty; and the names of variables that are no settings.
 
-    What a container platform sets by itself is passed over. Raises SettingsError for one that is nearly a setting.
+    Variables of container platforms are ignored. Raises SettingsError for a name that is nearly that of a setting.
     """
     found: dict[str, str] = {}
     strange: list[str] = []
@@ -77,21 +77,21 @@ def from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[s
 
 
 def _near(key: str, known: Sequence[str]) -> str | None:
-    """The known key that is nearest to this one; None where none is near."""
+    """The known key that is nearest to this one; None if none is near."""
     import difflib
 
     return next(iter(difflib.get_close_matches(key, known, 1)), None)
 
 
 def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
-    """The keys that can stand beside the last one of a place in the file, as the annotations of settings say it."""
+    """The keys that may stand in the table of the last key of `place`, a path of keys in the file."""
     part: type[Part] = Settings
     names = iter(place[:-1])
     for name in names:
         kind = part.model_fields[name].annotation
         part = next(one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, Part))
         if get_origin(kind) is dict:
-            next(names, None)  # what the user calls the table
+            next(names, None)  # the user's name of the table
     inside = [key for table, key in INSIDE.values() if place[:-1] == (table,)]
     return tuple(dict.fromkeys([*(TITLES.get(name, name) for name in part.model_fields), *inside]))
 
@@ -117,7 +117,7 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
 def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:
     """Merge and validate the settings. `flags` holds only what was given on the command line, and `config`.
 
-    Returns the settings and where each key that was set came from. Raises SettingsError.
+    Returns the settings, and the source of each key that was set. Raises SettingsError.
     """
     environment, _ = from_environment(environ)
     path = flags.get("config") or environment.pop("config", None)

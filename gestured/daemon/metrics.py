@@ -1,7 +1,7 @@
 """All counters of the daemon: plain integers, whether or not anybody asks for them.
 
-The loop's thread counts, the HTTP thread reads copies (exposition.py). The number of series is bounded whatever
-arrives: labels that a peer can choose (sensors) are folded together after the first few.
+The loop's thread counts, the HTTP thread reads copies (`exposition`). The number of series is bounded: labels that a
+peer can choose, such as sensors, are counted together after the first few.
 """
 
 import time
@@ -48,7 +48,7 @@ class Counter:
 
 
 class Histogram:
-    """How often a value fell below each bound, for each value of one label (`most` of them), or of none."""
+    """The number of values in each bucket, for the first `most` combinations of labels; later ones are "other"."""
 
     def __init__(self, name: str, text: str, bounds: Sequence[float], *labels: str, most: int = 1) -> None:
         self.name, self.text, self.bounds, self.labels, self._most = name, text, bounds, labels, most
@@ -110,10 +110,10 @@ class Metrics:
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
         self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets so far, and monotonic s when more were dropped
         self._named: set[str] = set()
-        self._said: dict[str, float] = {}  # by sensor: when its provisional event was decided, s, until the answer
+        self._said: dict[str, float] = {}  # by sensor: s, when its last unanswered provisional event was decided
 
     def kernel(self, drops: int) -> None:
-        """Remember when the kernel last dropped packets, of which there were so many by now."""
+        """Take the number of packets that the kernel has dropped so far, and note the time if there are more."""
         if drops > self.kernel_drops:
             self.kernel_drops, self.kernel_dropped_at = drops, time.monotonic()
 
@@ -149,7 +149,7 @@ class Metrics:
             self.suppressed.add(event.reason, gate)
 
     def sensor_label(self, sensor: str) -> str:
-        """The sensor's name for the first few, "other" after that."""
+        """The label of a sensor: its name for the first few sensors, "other" for all later ones."""
         if sensor in self._named:
             return sensor
         if len(self._named) < NAMED_SENSORS:

@@ -1,7 +1,7 @@
-"""Senders whose packets the kernel throws away before they take room in a socket's buffer: a classic BPF filter.
+"""Muted senders: a classic BPF filter of the kernel drops their packets before these take room in a socket's buffer.
 
-The filter sees a packet from its UDP header on; `NETWORK` is where its IP header begins (linux/filter.h). It is a list
-of rules, the first that fits decides, and what no rule names is let in.
+The filter sees a packet from its UDP header on; its IP header begins at the offset `NETWORK` (linux/filter.h). A filter
+is a list of rules: the first that matches a packet decides, and a packet that no rule matches is let in.
 """
 
 import array
@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 from gestured.core.owner import Source
 
-# Bytes that are dropped of a sender within a second, for each sensor that it owns, after which it is muted. A source of
-# many sensors that a slow machine cannot follow loses frames of all of them, but it is no flood.
+# A sender is muted if so many of its bytes are dropped within a second, for each sensor that it owns. A source of many
+# sensors for which a machine is too slow loses frames of all of them, but it is no flood.
 TOO_MUCH = 64 << 10
-HEADER_BYTES = 512  # that a packet takes in the kernel's buffer beside its own
+HEADER_BYTES = 512  # that a packet takes in the kernel's buffer besides its own bytes
 FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts twice as long as the one before
-LONGEST_S = 8.0  # the longest that a sender is muted, so that one that has mended its flood is heard soon
+LONGEST_S = 8.0  # the longest that a sender is muted, so that one that has ended its flood is soon heard
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
 NETWORK = 0xFFF00000
-LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # of absolute offsets
+LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # BPF
 LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
 MOST_RULES = 256  # rules of one filter, at most 13 instructions each; the kernel takes 4096 instructions
 
@@ -36,12 +36,12 @@ class Muted:
         self._until: dict[Sender, tuple[float, float]] = {}  # by sender: until when, and for how long (s)
         self._next = math.inf  # s, when the first muted sender is to be heard again
         self._dropped: dict[Sender, int] = {}  # by sender: bytes that were dropped since `_since`
-        self._since = 0.0  # s, when the second began in which that is counted
+        self._since = 0.0  # s, when the second began in which `_dropped` is counted
 
     def blame(
         self, dropped: Mapping[Sender, Collection[bytes]], now: float, owners: Mapping[Source, int]
     ) -> list[Sender]:
-        """The senders that are muted from `now` on, since these packets of theirs had to be dropped.
+        """Count packets of senders that were dropped; returns the senders that are muted for it from `now` on.
 
         `owners`: how many sensors each source owns.
         """
@@ -62,7 +62,7 @@ class Muted:
         return found
 
     def over(self, now: float) -> list[Sender]:
-        """The senders that were muted and are to be heard again."""
+        """The senders whose mute has ended since the last call."""
         if now < self._next:
             return []
         found = [sender for sender, (until, _) in self._until.items() if self._next <= until <= now]
@@ -71,7 +71,7 @@ class Muted:
         return found
 
     def rules(self, now: float, owners: Collection[Source]) -> list["Rule"]:
-        """What the kernel is to do at `now`. The ports of a muted host that own a sensor are heard on."""
+        """The rules of the filter at `now`. Ports of a muted host that own a sensor are still let in."""
         muted = [sender for sender, (until, _) in self._until.items() if until > now]
         ports = [Rule(*sender, False) for sender in muted if not isinstance(sender, str)]
         hosts = {sender for sender in muted if isinstance(sender, str)}
@@ -100,7 +100,7 @@ def mute(sock: socket.socket, rules: Iterable[Rule]) -> None:
 
 
 def _step(what: int, value: int, otherwise: int = 0) -> bytes:
-    """One instruction; a comparison that fails skips `otherwise` of them."""
+    """One BPF instruction; a comparison that fails skips `otherwise` instructions."""
     return struct.pack("@HBBI", what, 0, otherwise, value)
 
 

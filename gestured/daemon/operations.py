@@ -1,4 +1,4 @@
-"""What an operator may ask of a running daemon: the table of the control socket's verbs."""
+"""The verbs of the control socket: all that an operator may ask of a running daemon."""
 
 import time
 from collections.abc import Awaitable, Callable
@@ -17,19 +17,19 @@ from gestured.daemon.status import status
 from gestured.daemon.tap import as_lines
 from gestured.daemon.values import SensorName
 
-TEST_SENSORS = 64  # the most names of sensors that were never heard which tests may use
+TEST_SENSORS = 64  # the most names that tests may use for sensors that were never heard
 TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # touched frames of a made-up gesture, at 15 Hz
-MIDDLE = Place(0.5, 0.5)  # of a sensor: there a made-up gesture begins and ends
+MIDDLE = Place(0.5, 0.5)  # the middle of a sensor, where a made-up gesture begins and ends
 
 
 class Operations:
     """The verbs. Each checks everything before it changes anything."""
 
     def __init__(self, parts: Parts, reload: Callable[[], Awaitable[str | None]]) -> None:
-        """`reload` returns None, or why nothing has changed."""
+        """`reload` reloads the daemon; it returns None, or why nothing has changed."""
         self._parts, self._reload = parts, reload
-        self._tested: set[str] = set()  # names that tests have used of sensors that were never heard
+        self._tested: set[str] = set()  # names that tests have used for sensors that were never heard
 
     def verbs(self) -> dict[str, Verb]:
         """Name -> verb. This table is all that the control socket can do."""
@@ -47,11 +47,11 @@ class Operations:
         } | self._parts.gates.verbs()
 
     async def status(self, connection: Connection) -> Reply:
-        """How the daemon is, as `gesturectl status` shows it."""
+        """The state of the daemon, as `gesturectl status` shows it."""
         return status(self._parts)
 
     async def reload(self, connection: Connection) -> Reply:
-        """Read configuration and models anew; where one of them is bad, all old ones stay."""
+        """Read configuration and models anew; if one of them is bad, nothing changes."""
         reason = await self._reload()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
@@ -70,7 +70,7 @@ class Operations:
         return {"sensors": chosen}
 
     async def emit(self, connection: Connection, gesture: str, sensor: SensorName | None = None) -> Reply:
-        """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
+        """Publish a made-up gesture on every output, marked as a test, with the sensor's next sequence and id."""
         hub, known, model = self._parts.hub, self._parts.gestures, self._parts.hub.scene.gestures
         sensor = sensor or "test"
         if gesture not in known:
@@ -122,7 +122,7 @@ class Operations:
         return {"model": parts.ladder.active, "gestures": list(parts.hub.scene.gestures), "own": parts.own.report()}
 
     async def forget(self, connection: Connection, name: str) -> Reply:
-        """Forget a gesture of the user's own, and delete its examples from the file; not one that arms a sensor."""
+        """Forget an own gesture, and delete its examples from the file. Refused for one that arms a sensor."""
         for setting, gesture in self._parts.hub.scene.arming_gestures.items():
             if gesture == name:
                 raise Refusal(f"{name!r} is {setting} in the configuration; take it out there and reload first")
@@ -134,7 +134,7 @@ class Operations:
         _not_yet(connection)
         self._parts.taps.join(connection)
         for gate in self._parts.hub.listening(now := time.monotonic()):
-            self._parts.taps.publish(gate, time.time() - now)  # what holds where the tape begins
+            self._parts.taps.publish(gate, time.time() - now)  # the state at the beginning of the tape
         return scene(self._parts)
 
     async def flight(self, connection: Connection) -> ReplyStream:
@@ -145,7 +145,7 @@ class Operations:
         return scene(self._parts) | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',))
 
     def _heard(self, sensor: str | None = None) -> dict[str, Reading]:
-        """The sensors that were heard, by name. Raises Refusal where the one that is asked for is none of them."""
+        """The sensors that were heard, by name. Raises Refusal if `sensor` is named and none of them."""
         heard = {name: one for name, one in self._parts.readings().items() if one.source is not None}
         if sensor is not None and sensor not in heard:
             raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
@@ -153,7 +153,7 @@ class Operations:
 
 
 def scene(parts: Parts) -> dict[str, Any]:
-    """What a recording must know to be understood without this daemon; `epoch_ns`: from the loop's clock to 1970."""
+    """What a recording must hold to be understood without this daemon; for `epoch_ns` see `Taps`."""
     model = parts.ladder.model
     return {
         "version": __version__,
@@ -172,6 +172,6 @@ def scene(parts: Parts) -> dict[str, Any]:
 
 
 def _not_yet(connection: Connection) -> None:
-    """Raises Refusal where a stream is on this connection already: its lines could not be told from another's."""
+    """Raises Refusal if the connection has a stream already, whose lines could not be told from those of another."""
     if connection.streams:
         raise Refusal("this connection is a tap already, or another stream; open one more")

@@ -1,4 +1,4 @@
-"""The user's own gestures in a running daemon: the enrolment that goes on, the list in use, and its file."""
+"""The user's own gestures in a running daemon: the open enrolment, the gestures in use, and their file."""
 
 import asyncio
 import time
@@ -21,8 +21,8 @@ from gestured.model.model import Model
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
-ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
-ANSWERED_TWICE = "refractory"  # a contact so cancelled was `Decided`, too, and counts once
+ATTEMPT_S = 120.0  # an enrolment without an attempt for so long is given up
+ANSWERED_TWICE = "refractory"  # a contact that is cancelled for this reason was `Decided`, too, and counts once
 
 
 def silent(sensor: str, gates: Collection[str]) -> str:
@@ -31,26 +31,26 @@ def silent(sensor: str, gates: Collection[str]) -> str:
 
 
 class OwnGestures:
-    """The own gestures in use, and one enrolment at a time. `changed` is called when the list has changed."""
+    """The own gestures in use, and one enrolment at a time. `changed` is called when the gestures have changed."""
 
     def __init__(self, changed: Callable[[], None]) -> None:
         """`follow` must be called before anything else."""
         self._changed = changed
         self._keeper = Keeper(None)
-        self._open: tuple[Enrolment, Connection] | None = None  # what is being learned, and who waits for it
+        self._open: tuple[Enrolment, Connection] | None = None  # and the connection that asked for it
         self._heard = 0.0  # monotonic s, the last attempt
         self._finishing: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
-        self.writing = asyncio.Lock()  # held from where the file is read until what was read is used
+        self.writing = asyncio.Lock()  # held from the reading of the file until its gestures are in use
 
     def read(self, path: Path | None, ladder: Ladder) -> tuple[Keeper, Own]:
-        """Read a file, and have the model that answers look at it; any thread that holds `writing` may call it."""
+        """Read a file, and make the prototypes of the model that answers; any thread that holds `writing` may."""
         keeper = self._keeper if path == self._keeper.path else Keeper(path)
         keeper.read()
         return keeper, ladder.compared(keeper.found.gestures)
 
     def follow(self, ladder: Ladder, keeper: Keeper, own: Own) -> None:
-        """Compare contacts with the examples that were read, by these models: at the start, and after a reload."""
+        """Compare contacts with examples that were read, by these models; called at the start and after a reload."""
         if self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
         if keeper is not self._keeper:
@@ -61,13 +61,13 @@ class OwnGestures:
         self._use(own)
 
     def _use(self, own: Own) -> None:
-        """Compare with these from now on; log which of them the model that answers cannot tell apart."""
+        """Compare contacts with `own` from now on; log which gestures the model that answers cannot tell apart."""
         self._ladder.own = own
         own.missing = self._prepare
         self._warn()
 
     def _prepare(self, model: Model) -> None:
-        """Have a model that answers now look at the examples; until it has, it knows none of them."""
+        """Have the prototypes of a model made that answers now; until they are, it knows no own gestures."""
         if self._preparing is None or self._preparing.done():
             self._preparing = asyncio.get_running_loop().create_task(self._make(self._ladder.own, model))
 
@@ -91,7 +91,7 @@ class OwnGestures:
 
     @property
     def off(self) -> str | None:
-        """Why the model that answers knows none of them, or None."""
+        """Why the model that answers knows no own gestures, or None."""
         return f"{self._ladder.active} has no embedding" if self._ladder.model.space is None else None
 
     def report(self) -> dict[str, Any]:
@@ -108,11 +108,11 @@ class OwnGestures:
 
     @property
     def enrolling(self) -> bool:
-        """Whether somebody performs examples now."""
+        """Whether an enrolment is open."""
         return self._open is not None
 
     async def writable(self) -> None:
-        """Raises OwnFileError where nothing can be enrolled, because the file cannot be written."""
+        """Raises OwnFileError if nothing can be enrolled because the file cannot be read or written."""
         async with self.writing:
             if self._keeper.found.fault is not None:
                 raise OwnFileError(self._keeper.found.fault)
@@ -133,7 +133,7 @@ class OwnGestures:
         self._examiner = partial(Examiner, model, model.space, in_use=in_use)
         self._open = Enrolment(name, sensor, examples, self._examiner(self._ladder.own)), connection
         self._heard = time.monotonic()
-        connection.streams = True  # so that it is not ended for asking nothing
+        connection.streams = True  # so that the connection is not closed for asking nothing
 
     def see(self, fact: Fact) -> None:
         """Look at a fact of the hub: each answer of the sensor is an attempt."""
@@ -145,7 +145,7 @@ class OwnGestures:
         if isinstance(fact, Cancelled) and fact.reason == ANSWERED_TWICE:
             return
         if isinstance(fact, Unknown) and not fact.gates:
-            return  # it was `Decided`, too
+            return  # this contact was `Decided`, too
         self._heard = time.monotonic()
         if isinstance(fact, Unknown):
             reason = silent(fact.sensor, fact.gates)
@@ -182,7 +182,7 @@ class OwnGestures:
 
     async def _finish(self, enrolment: Enrolment, connection: Connection) -> None:
         def with_it(found: Examples) -> Examples:
-            self._check(enrolment.name, found)  # models and file may be others by now
+            self._check(enrolment.name, found)  # models and file may have changed by now
             return {**found, enrolment.name: tuple(enrolment.kept)}
 
         try:
@@ -198,14 +198,14 @@ class OwnGestures:
             self._finishing = None
 
     async def _change(self, change: Callable[[Examples], Examples]) -> None:
-        """Write the file anew, and use what is in it then."""
+        """Change the file, and use the gestures that it holds then."""
         async with self.writing:
             ladder = self._ladder
             await asyncio.to_thread(self._keeper.change, change, ladder.model.sha256)
             own = await asyncio.to_thread(ladder.compared, self._keeper.found.gestures)
             self._use(own)
         if self._open is not None:
-            self._open[0].judge = self._examiner(own)  # what was forgotten speaks against no example any more
+            self._open[0].judge = self._examiner(own)  # a gesture that was forgotten must rule out no example
         self._changed()
 
     def _check(self, name: str, gestures: Examples) -> None:

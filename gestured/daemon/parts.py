@@ -1,4 +1,4 @@
-"""What a running daemon is made of, for those who look at several of its parts."""
+"""The parts of a running daemon, for the modules that use several of them."""
 
 import secrets
 import time
@@ -66,17 +66,17 @@ class Parts:
 
     @property
     def gestures(self) -> tuple[str, ...]:
-        """The gestures that a client may hear of: the model's in use, and the user's own."""
+        """The gestures that a client may receive: those of the model's that are in use, and the user's own."""
         return (*self.hub.scene.gestures, *self.own.gestures)
 
     @property
     def served(self) -> float:
-        """Until when packets were served as of now, in monotonic s: a sensor whose packets wait is not silent."""
+        """The time up to which packets were served, in monotonic s: a sensor whose packets wait is not silent."""
         return time.monotonic() - self.receiver.behind_s
 
     @property
     def late_s(self) -> float:
-        """How late the daemon is, in s: its loop, or the packets that it reads, where more come than it can serve."""
+        """How late the daemon is, in s: its loop, or the packets that it serves if too many come."""
         return max(self.pulse.lag_s, self.receiver.behind_s)
 
     def readings(self) -> dict[str, Reading]:
@@ -84,14 +84,14 @@ class Parts:
         return self.hub.readings(self.served)
 
     def listening(self) -> dict[str, dict[str, Any]]:
-        """What gates and arming say of the sensors of which they say anything."""
+        """By sensor that has closed gates or arming, their state; `until` is in s since the Unix epoch."""
         now = time.monotonic()
         epoch, gates = time.time() - now, self.hub.listening(now)
         until = {gate.sensor: None if gate.until is None else gate.until + epoch for gate in gates}
         return {g.sensor: {"armed": g.armed, "closed": g.closed, "until": until[g.sensor]} for g in gates}
 
     def awaiting_restart(self) -> list[str]:
-        """Settings that a reload has read, but that a restart alone can put to use."""
+        """Settings that a reload has read with another value, but that only a restart puts to use."""
         new, old = self.settings, self._started_with
         changed = [key for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
         return list(dict.fromkeys(TITLES.get(key, key) for key in changed))

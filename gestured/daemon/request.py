@@ -1,4 +1,4 @@
-"""Requests of the control socket: who asks, what each verb takes, and how it is answered. Both are JSON lines."""
+"""Requests of the control socket: who asks, what each verb takes, and how it is answered, all as JSON lines."""
 
 import asyncio
 import os
@@ -18,7 +18,7 @@ from gestured.core.messages import json_object, quoted
 from gestured.daemon.values import expected
 
 MAX_REQUEST_BYTES = 4096  # bytes of a request
-BACKLOG_BYTES = 8 << 20  # bytes that wait for a connection with a stream at most; lines beyond are lost, and counted
+BACKLOG_BYTES = 8 << 20  # the most bytes that wait for a connection with a stream; further lines are lost, and counted
 SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 Reply = dict[str, Any]
@@ -37,14 +37,14 @@ class Peer:
 
 
 def peer_of(sock: socket.socket) -> Peer:
-    """Who is at the other end of a connected Unix socket: the kernel says it, whatever the peer claims."""
+    """The peer at the other end of a connected Unix socket, as the kernel knows it."""
     pid, uid, gid = CREDENTIALS.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
     groups = {gid}
     try:
         raw = sock.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, 1024)
         groups |= set(struct.unpack(f"{len(raw) // 4}I", raw))
     except OSError:
-        pass  # an old kernel, or in more groups than fit: its first group counts
+        pass  # an old kernel, or a peer in more groups than fit: only its first group counts
     ours = uid in (0, os.geteuid())
     return Peer(pid, uid, ours, ours or os.getegid() in groups)
 
@@ -56,11 +56,11 @@ class Connection:
         self._writer = writer
         self.lost = 0  # lines that found no room in the backlog
         self.streams = False  # whether it is sent a stream of lines, and need not ask for anything
-        self.flush: Callable[[], None] = lambda: None  # has what waits for this connection sent
+        self.flush: Callable[[], None] = lambda: None  # sends what waits elsewhere for this connection
         self._over = False
 
     def send(self, text: bytes, *, lines: int = 1) -> bool:
-        """Send a line, or several, or count them as lost where too much waits already; never blocks."""
+        """Send a line, or several, or count them as lost if too much waits already; never blocks."""
         if self.closed:
             return False
         if self.unread > BACKLOG_BYTES:
@@ -71,7 +71,7 @@ class Connection:
 
     @property
     def unread(self) -> int:
-        """Bytes that wait to be read, without those that the kernel keeps."""
+        """Bytes that wait to be sent, without those that the kernel has taken."""
         return 0 if self.closed else self._writer.transport.get_write_buffer_size()
 
     @property
@@ -80,7 +80,7 @@ class Connection:
         return self._over or self._writer.is_closing()
 
     def end(self) -> None:
-        """Send nothing more after what waits for this connection already."""
+        """Send what already waits for this connection, and nothing after it."""
         self.flush()
         self._over = True
 
@@ -100,7 +100,7 @@ class Verb:
 
 @cache
 def _keys_of(run: Callable[..., object]) -> type[BaseModel]:
-    """The keys of a verb and their types. Made when it is first asked for, since that takes a while."""
+    """A model of the keys that a verb takes. It is made when the verb is first asked for, since that takes a while."""
     found = [one for one in signature(run).parameters.values() if one.name != "connection"]
     keys: dict[str, Any] = {
         one.name: (one.annotation, ... if one.default is one.empty else one.default) for one in found
@@ -120,7 +120,7 @@ def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str
     try:
         found = keys.model_validate(request)
     except ValidationError as error:
-        problem = error.errors(include_url=False, include_context=False)[-1]  # unknown keys stand at the end
+        problem = error.errors(include_url=False, include_context=False)[-1]  # pydantic puts unknown keys at the end
         if problem["type"] == "extra_forbidden":
             known = ", ".join(keys.model_fields) or "no key"
             raise Refusal(f"{name}: unknown key {quoted(problem['loc'][0])}, expected {known}") from error
