@@ -1,4 +1,4 @@
-"""One daemon: it puts the parts together, and runs their timers from start to end."""
+"""The service: the parts of one daemon put together, with their timers from start to end."""
 
 import asyncio
 import time
@@ -37,7 +37,7 @@ from gestured.daemon.views import Views
 from gestured.model.own import Own
 
 STATUS_S = 1.0  # from one status to the next
-DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
+DRAIN_S = 0.5  # s for clients to read what waits for them, when the daemon ends
 SHOWN = 4  # sensors in systemd's status line
 
 Loader = Callable[[], Settings]  # reads the configuration
@@ -50,7 +50,7 @@ class Service:
         """Serve packets from now on. `load` reads the configuration again, for a reload."""
         settings, ladder = asked.settings, asked.ladder
         self._load, self._reloading = load, asyncio.Lock()
-        self._reload: asyncio.Task[str | None] | None = None  # a task that nobody holds may be collected
+        self._reload: asyncio.Task[str | None] | None = None  # kept, since a task without a reference may be collected
         self._said = ""  # the last STATUS= that systemd was told
         for name in settings.sensors:
             metrics.sensor_label(name)  # the sensors of the configuration get the first labels
@@ -82,7 +82,7 @@ class Service:
         return (parts.clients, *parts.asked.outputs, parts.taps, parts.views)
 
     def _hello(self) -> bytes:
-        """The first line to a client."""
+        """The first line that a client is sent."""
         parts = self.parts
         names = parts.ladder.active, parts.gestures, parts.hub.sequences(), parts.listening()
         return messages.hello_json(__version__, parts.instance, *names)
@@ -95,28 +95,28 @@ class Service:
         return {"types": types, "gestures": self.parts.gestures, "zones": tuple(zones)}
 
     def _own_changed(self) -> None:
-        """One of the user's own gestures came or went: whatever was asked about a contact is asked again."""
+        """Drop what the model said of open contacts, and tell clients the gestures: an own one came or went."""
         parts = self.parts
         parts.desk.take(parts.hub.change(parts.hub.scene, parts.ladder, time.monotonic()))
         parts.clients.tell(messages.gestures_json(parts.gestures))
 
     def _foresee(self) -> None:
-        """Have the hub give provisional events where somebody asks for them now, and soon touch events alike."""
-        asyncio.get_running_loop().call_soon(self._follow)  # not among the events of which a client was just told
+        """Have the hub give the provisional events that somebody asks for now, and soon after the touch events."""
+        asyncio.get_running_loop().call_soon(self._follow)  # later, since a client is just being sent touch events
         self.parts.hub.foresee(self._wanted("provisional"))
 
     def _follow(self) -> None:
-        """Have the hub give touch events where somebody asks for them now."""
+        """Have the hub give the touch events that somebody asks for now."""
         self.parts.desk.take(self.parts.hub.follow(self._wanted("touch")))
 
     def _wanted(self, kind: str) -> frozenset[str] | None:
-        """The sensors of which somebody wants events of that type, None for all."""
+        """The sensors of which somebody wants events of the type `kind`; None for all."""
         named, every = self.parts.clients.audience.asked(kind)
         every = every or any(kind in output.wants for output in self.parts.asked.outputs)
         return None if every else named | self.parts.views.sensors
 
     async def start(self) -> None:
-        """Take the connections of operators and bridges, which needs a loop that turns."""
+        """Accept connections of operators and bridges, for which the loop must be running."""
         for server in self._servers:
             await server.start()
 
@@ -134,7 +134,7 @@ class Service:
             now = time.monotonic()
             parts.desk.take(parts.hub.tick(parts.receiver.served))
             if now >= status_at:
-                status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
+                status_at = max(status_at + STATUS_S, now)  # on time, but with no catching up after a stall
                 self._every_second()
             if watchdog and canary.sings():
                 notify("WATCHDOG=1")
@@ -155,7 +155,7 @@ class Service:
         for part in (parts.clients, parts.taps, parts.views, parts.own):
             part.tick()
         parts.metrics.kernel(kernel_drops(parts.bound.udp))
-        states = parts.hub.states(parts.served)  # no status: of a thousand sensors that is a stall
+        states = parts.hub.states(parts.served)  # not `status`, which is a stall for a thousand sensors
         state = overall(states, impaired=parts.impaired)
         parts.desk.publish(Status(state, states, active, time.time(), parts.listening()))
         shown = ", ".join(f"{name} {state}" for name, state in list(states.items())[:SHOWN])
@@ -184,14 +184,14 @@ class Service:
         log.info("ended")
 
     async def reload(self) -> str | None:
-        """Read everything anew, after the reloads that have begun; returns None, or why nothing has changed.
+        """Read configuration, models and own gestures anew. Returns None, or why nothing has changed.
 
-        Only where all of it is valid does anything change. Frames are served meanwhile.
+        It waits for reloads that have begun. Nothing changes unless all is valid. Frames are served meanwhile.
         """
         async with self._reloading:
             notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
             try:
-                settings = await asyncio.to_thread(self._load)  # a long file, or a slow disk
+                settings = await asyncio.to_thread(self._load)  # a disk may be slow
                 asked = await asyncio.to_thread(open_all, settings, self.parts.metrics, insist=True)
             except Exception as error:
                 bug = not isinstance(error, GesturedError)
@@ -209,7 +209,7 @@ class Service:
                 notify("READY=1")
 
     def _go_on(self, asked: Asked, keeper: Keeper, own: Own) -> None:
-        """Go on with what a reload has opened."""
+        """Put to use what a reload has opened."""
         parts, settings, ladder = self.parts, asked.settings, asked.ladder
         logging.configure(settings.log_level)
         before, outputs, parts.asked = parts.gestures, parts.asked.outputs, asked

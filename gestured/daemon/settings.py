@@ -1,4 +1,4 @@
-"""What can be set. Every key is described here, and nowhere else: help and documents are made from this."""
+"""The settings. Every key is described here and nowhere else, since help and documents are made from this module."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal
@@ -29,7 +29,7 @@ from gestured.daemon.values import (
 
 
 class Part(BaseModel):
-    """Base of all settings: unknown keys are errors, nothing changes after it was read."""
+    """Base of all settings: unknown keys are errors, and no value changes once it was read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
 
@@ -232,9 +232,9 @@ class Settings(Part):
 
 
 TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # settings that are tables, in the file only
-# Tables whose title in the file is another than our name for them, since a setting has that name, and their titles.
+# The titles in the file of tables that have another name here, since a setting has the title as its name.
 TITLES = {"per_gesture": "gestures", "gate": "gates"}
-INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # those settings: table, and key there
+INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # such a setting's place in that table
 FLAGS = tuple(name for name in Settings.model_fields if name not in TABLES)
 REPEATED = ("fallback", "publish", "allow")
 

@@ -1,12 +1,12 @@
-"""Distribution shift: do the gestures of this deployment look like those that the model was trained on?
+"""Distribution shift: whether the gestures of this deployment look like those that the model was trained on.
 
-The model's metadata say between which values the middle 98 % of its training gestures lay (`measures`, and the
-strength), and with which confidence it answered people whom it had not seen. Of the last LAST gestures we count how
-many lie outside, or below the confidence. 2 % of the training's do (1 % of the confidence's); one person's are no
-sample of all people, so nothing is said below UNLIKELY. Of all segments we count how many were unknown; touches that
-are no gestures are among them, so nothing is said below MANY. (A test of the whole distribution, such as the population
-stability index, would call every single driver a shift: one hand varies less than a population's. The range does not.)
-Memory is LAST numbers a quantity.
+A model's metadata give the range of the middle 98 % of its training gestures, for each of `measures` and for the
+strength, and the quantiles of its confidence for people whom it had not seen. Of the last LAST gestures we count how
+many lie outside of a range, or below the 1 % quantile of the confidence. By chance these are 2 % (1 % for the
+confidence), but one person is no sample of all people, so only a share from UNLIKELY on is a shift. Of the last LAST
+segments we count how many were unknown; touches that are no gestures are among them, so only a share from MANY on is a
+shift. (A test of the whole distribution, such as the population stability index, would call every single driver a
+shift, since one hand varies less than those of a population.)
 """
 
 import math
@@ -24,7 +24,7 @@ from gestured.model.model import Model
 
 LAST = 100  # gestures
 LEAST_GESTURES = 20  # the fewest gestures from which a shift is told
-UNLIKELY = 0.2  # share outside; with 2 % expected, 4 of 20 come by chance once in 1700 times (binomial)
+UNLIKELY = 0.2  # share outside from which it is a shift; with 2 % expected, 4 of 20 come by chance once in 1700 times
 MANY = 0.5  # share of unknown segments from which it is a shift
 UNKNOWN = "unknown"
 QUANTITIES = ("strength", *MEASURES, "confidence")
@@ -47,7 +47,7 @@ class Shift:
         return cls(model.metadata.quantiles, model.metadata.window)
 
     def see(self, decided: Decided) -> None:
-        """Take a segment that was decided, unless a fallback did: the quantiles are not that model's."""
+        """Take a segment that was decided, unless a fallback did, since the quantiles are another model's."""
         if not self._outside or decided.scores.degraded:
             return
         if UNKNOWN in self._outside:
@@ -62,7 +62,7 @@ class Shift:
 
     @property
     def count(self) -> int:
-        """Gestures that are counted now."""
+        """How many gestures the shares are made from."""
         return max((len(self._outside[name]) for name in self.ranges), default=0)
 
     def shares(self) -> dict[str, float]:
@@ -86,7 +86,7 @@ def measured(segment: Segment, window: Window) -> dict[str, float]:
 
 
 def _range(quantiles: Mapping[str, Any], name: str) -> tuple[float, float] | None:
-    """(1 %, 99 %) where the metadata hold them; a model of somebody's own may say less, or nonsense."""
+    """The quantiles (1 %, 99 %) of a quantity; None if the metadata do not hold them, as those of a foreign model."""
     try:
         at, values = np.asarray(quantiles["at"], float), np.asarray(quantiles[name], float)
         low, high = (float(values[np.flatnonzero(at == q)[0]]) for q in (0.01, 0.99))

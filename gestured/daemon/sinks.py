@@ -1,4 +1,4 @@
-"""Where events go. A sink takes every event and never blocks; what it cannot deliver it counts."""
+"""The sinks of events. A sink takes every event, never blocks, and counts what it cannot deliver."""
 
 import math
 import signal
@@ -15,7 +15,7 @@ from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import reason_of
 
-LOOK_UP_S = 5.0  # from one look-up of a destination that was not found or not reached to the next
+LOOK_UP_S = 5.0  # between two look-ups of a destination that was not found or not reached
 
 
 class Sink(Protocol):
@@ -32,11 +32,11 @@ class Sink(Protocol):
 class UdpOut(Sink):
     """A sink that the configuration names, at one UDP address: it never blocks, and counts what it cannot deliver.
 
-    A reload replaces it. The socket is connected, so that a port where nobody listens is told to us (by the next
-    call). A destination that cannot be reached costs some failed system calls a packet, nothing more.
+    A reload replaces it. The socket is connected, so that the next call tells us of a port without a listener. A
+    destination that cannot be reached costs some failed system calls for each packet, and nothing more.
     """
 
-    wants: frozenset[str] = frozenset()  # types of events that are made only where somebody wants them
+    wants: frozenset[str] = frozenset()  # the types it takes of events that are made only on demand
 
     def __init__(self, destination: Address, metrics: Metrics) -> None:
         from gestured.client import osc_out  # python-osc: a daemon that publishes nothing does not load it
@@ -44,12 +44,12 @@ class UdpOut(Sink):
         self._out = osc_out
         self.destination = destination
         self._metrics, self._throttle = metrics, Throttle()
-        self._found: tuple[int, Any] | None = None  # family and address, where no socket is connected to them yet
+        self._found: tuple[int, Any] | None = None  # family and address to which no socket is connected yet
         self._socket: socket.socket | None = None
         self._look_up()
 
     def _look_up(self) -> None:
-        """Find the destination, which may block for seconds; any thread may."""
+        """Look up the destination, which may block for seconds; any thread may do so."""
         try:
             self._found = look_up(self.destination, socket.SOCK_DGRAM)
         except OSError as error:
@@ -62,7 +62,7 @@ class UdpOut(Sink):
         self._look_up()
 
     def take_over(self, before: "UdpOut") -> None:
-        """Go on where one ends that a reload replaces, if it has the same destination."""
+        """Take over the state of a sink that a reload replaces, if that has the same destination."""
 
     def close(self) -> None:
         """Close the socket; nothing is sent after it."""
@@ -87,11 +87,11 @@ class UdpOut(Sink):
                 self._failed("full")
                 return
             except OSError:
-                self._lost("unreachable")  # after a change of network, either address may be new
+                self._lost("unreachable")  # after a change of network, our address or the destination's may be new
                 return
 
     def _connect(self, family: int, where: Any) -> None:
-        """A new socket, since one that was connected keeps our own address of then, even if it is connected again."""
+        """Connect a new socket, since an old one keeps our address of its first connection even if connected again."""
         if self._socket is not None:
             self._socket.close()
         self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
@@ -99,7 +99,7 @@ class UdpOut(Sink):
         self._found = None
 
     def _lost(self, result: str) -> None:
-        """Count a packet that cannot be sent, and look the destination up again, every LOOK_UP_S at the most."""
+        """Count a packet that cannot be sent, and look the destination up again, at most every LOOK_UP_S."""
         self._failed(result)
         if time.monotonic() >= self._due:
             self._due = math.inf
@@ -122,9 +122,9 @@ class OscSink(UdpOut):
         self._said: dict[str, Provisional] = {}  # by sensor: the provisional event that was sent, until its answer
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send a gesture and where it was, the status, or where asked for a provisional event; others do not travel.
+        """Send a gesture with its place, the status and, if asked for, a provisional event; other events are not sent.
 
-        A test's messages stand in a bundle behind `/gestured/test ,s sensor`; their arguments are the usual ones.
+        The messages of a test stand in a bundle, after `/gestured/test ,s sensor`; their arguments are the usual ones.
         """
         message = self._out.message
         if isinstance(event, Status):
@@ -152,12 +152,12 @@ class OscSink(UdpOut):
                 self.send(one.dgram)
 
     def take_over(self, before: UdpOut) -> None:
-        """Revoke what the one before has said, where that turns out wrong."""
+        """Take over the provisional events that the sink before has sent, to revoke them if they turn out wrong."""
         if isinstance(before, OscSink) and before.destination == self.destination and self.wants:
             self._said, before._said = before._said, {}
 
     def close(self) -> None:
-        """Take back what was said of contacts that nobody hears the end of, then close the socket."""
+        """Revoke the provisional events whose answers will not be sent, then close the socket."""
         for said in self._said.values():
             self._revoke(said)
         super().close()
@@ -166,7 +166,7 @@ class OscSink(UdpOut):
         self.send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", (said.gesture, said.id)).dgram)
 
     def _judge(self, answer: Gesture | Unknown | Cancelled) -> None:
-        """Take back what was sent of a contact that turns out to be something else."""
+        """Revoke the provisional event of a contact if its answer does."""
         said = self._said.get(answer.sensor)
         if said is not None and said.id == answer.id:
             del self._said[answer.sensor]

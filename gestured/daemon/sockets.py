@@ -1,4 +1,4 @@
-"""The daemon's sockets: all are made before it says that it is ready; one that cannot be had ends it with status 4."""
+"""The daemon's sockets. All are made before the daemon is ready; if one cannot be had, it exits with status 4."""
 
 import errno
 import fcntl
@@ -13,9 +13,9 @@ from gestured.client.address import SOCKET_PATH_BYTES, bind_failure, look_up
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-RECEIVE_BYTES = 4 << 20  # twenty times the usual default: what a sensor sends while the loop stands still
+RECEIVE_BYTES = 4 << 20  # twenty times the usual default, for what sensors send while the loop stands still
 BACKLOG = 1024  # connections that wait to be accepted: a thousand clients may come back at once after a restart
-AGAIN_S = 1.0  # the pause before the next connection is accepted where there was no descriptor for one
+AGAIN_S = 1.0  # the pause before another attempt to accept a connection for which there was no descriptor
 SO_RCVBUFFORCE = 33  # Linux; these three are not in Python's socket module
 SO_TIMESTAMPNS = 35
 SO_MEMINFO = 55  # it gives nine numbers, the last of which counts dropped packets
@@ -42,7 +42,7 @@ def _bind(key: str, address: Address, kind: int) -> socket.socket:
 
 
 def bind_udp(address: Address) -> socket.socket:
-    """A non-blocking UDP socket with a large receive buffer, as far as the kernel grants it."""
+    """A non-blocking UDP socket with a receive buffer as large as the kernel grants. Raises AddressError."""
     sock = _bind("listen", address, socket.SOCK_DGRAM)
     try:
         sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)  # beyond the limit, for CAP_NET_ADMIN
@@ -53,7 +53,7 @@ def bind_udp(address: Address) -> socket.socket:
 
 
 def stamp_arrivals(sock: socket.socket) -> None:
-    """Have the kernel say of each datagram from now on when it came."""
+    """Have the kernel stamp each datagram from now on with its arrival."""
     sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
@@ -63,7 +63,7 @@ def kernel_drops(sock: socket.socket) -> int:
 
 
 def reason_of(error: OSError) -> str:
-    """The name of what went wrong, such as EMFILE."""
+    """The name of an error, such as EMFILE."""
     return errno.errorcode.get(error.errno or 0, str(error))
 
 
@@ -110,9 +110,9 @@ class UnixListener(Listener):
         try:
             self._clear()
             self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
-            before = os.umask(0o117)  # 0660 from the start, not after a moment
+            before = os.umask(0o117)  # the mode is 0660 from the start
             try:
-                whole = path.absolute()  # the kernel's table shows it, by which `status --all` finds a daemon
+                whole = path.absolute()  # `status --all` finds it in the kernel's table
                 self.sock.bind(str(whole if len(os.fsencode(whole)) <= SOCKET_PATH_BYTES else path))
             finally:
                 os.umask(before)
@@ -127,7 +127,7 @@ class UnixListener(Listener):
 
     def close(self) -> None:
         """Remove the socket and the lock unless another daemon's stand there by now, and stop listening."""
-        _remove(self.path, self._made)  # before it is closed: then another file may get its number
+        _remove(self.path, self._made)  # not after closing, when another file may get its inode number
         self.sock.close()
         self._release_lock()
 

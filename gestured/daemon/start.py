@@ -1,4 +1,4 @@
-"""From settings to a daemon that serves: sockets, models, signals, and the line that says so."""
+"""The start of the daemon: sockets, models, signals, and the line that says that it is ready."""
 
 import asyncio
 import faulthandler
@@ -31,7 +31,7 @@ from gestured.model.process import end_all
 DESCRIPTORS = 4096  # wanted, for 1024 clients; the usual soft limit is 1024 in all
 FEWEST_DESCRIPTORS = 64  # needed for the daemon itself, operators, destinations and a few clients
 STOPS = (signal.SIGTERM, signal.SIGINT)
-END_S = 4.0  # for what is in flight, and for clients to read it; the units give it 5
+END_S = 4.0  # s for open contacts, and for clients to read their answers; systemd's units allow 5
 
 
 def run(settings: Settings, load: Loader) -> None:
@@ -46,9 +46,9 @@ def run(settings: Settings, load: Loader) -> None:
 
 
 async def _run(settings: Settings, load: Loader) -> None:
-    """Bind sockets, open models, serve. What cannot be had ends the daemon before it says that it is ready."""
+    """Bind sockets, open models, serve. A failure before that ends the daemon before it says that it is ready."""
     loop = asyncio.get_running_loop()
-    _abort(signal.SIG_BLOCK)  # in threads that are made from here on: it reaches this one
+    _abort(signal.SIG_BLOCK)  # in all threads that are made from here on; this one unblocks it below
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
     stop, reload = asyncio.Event(), asyncio.Event()
     loop.set_exception_handler(partial(report, Throttle()))
@@ -60,10 +60,10 @@ async def _run(settings: Settings, load: Loader) -> None:
         _when(number, partial(_end_at_once, bound))
     try:
         metrics = Metrics()
-        service = Service(open_all(settings, metrics), metrics, bound, load)  # it alone holds models: reloads free them
+        service = Service(open_all(settings, metrics), metrics, bound, load)  # no variable here keeps a model alive
         for number in STOPS:
             _when(number, partial(loop.call_soon_threadsafe, stop.set))
-        gc.freeze()  # what the start has made stays: later collections need not walk through it
+        gc.freeze()  # the objects of the start stay, so later collections need not visit them
         await service.start()
         _abort(signal.SIG_UNBLOCK)
         _announce(service)
@@ -72,13 +72,13 @@ async def _run(settings: Settings, load: Loader) -> None:
     finally:
         bound.close()
         end_all()  # threads may wait for a model that is being opened, and the end waits for threads
-    served.set()  # and for one that waits for a name of a host, or for a disk, it waits END_S in all
+    served.set()  # threads may also wait for a name server or a disk: for these the end waits END_S in all
 
 
 def report(throttle: Throttle, _: asyncio.AbstractEventLoop, what: dict[str, Any]) -> None:
-    """Log what an event loop tells of an error that nobody handled.
+    """Log an error that nobody handled, as an event loop reports it.
 
-    A connection that was lost is no bug, though asyncio tells of it, too, where its streams are collected as garbage.
+    A lost connection is no bug, though asyncio reports it, too, when its streams are collected as garbage.
     """
     error = what.get("exception")
     if not isinstance(error, ConnectionError):
@@ -110,9 +110,9 @@ def _ignore_stops() -> None:
 
 
 def _end_at_once(bound: Bound) -> None:
-    """End a start: nobody waits for a model whose opening never ends.
+    """End the process during its start, without waiting for a model that is being opened.
 
-    It raises no exception, since a library that is being imported would make an error of its own of it.
+    It raises no exception, since a library that is being imported would turn it into an error of its own.
     """
     _ignore_stops()
     bound.close()
@@ -122,11 +122,11 @@ def _end_at_once(bound: Bound) -> None:
 
 
 def _end_surely(loop: asyncio.AbstractEventLoop, served: threading.Event) -> None:
-    """See to it that a stop ends the process even where the loop's thread never comes back from a model.
+    """Make sure that a stop ends the process, even if the loop's thread never comes back from a model.
 
-    It is a failure, unless all has been `served` by then, and threads alone are not done.
-    Python's own handlers wait for that thread. What a signal writes to the wakeup descriptor any thread can read; we
-    take the loop's place there, so we wake it, too.
+    The exit status is then 1, or 0 if all was `served` and only other threads are not done. Python's signal handlers
+    wait for the loop's thread, but any thread can read what a signal writes to the wakeup descriptor. A thread of our
+    own takes the loop's place there, so it wakes the loop, too.
     """
     signals, wakeup = socket.socketpair()
     wakeup.setblocking(False)
@@ -140,7 +140,7 @@ def _end_surely(loop: asyncio.AbstractEventLoop, served: threading.Event) -> Non
                 time.sleep(END_S)
                 if not served.is_set():
                     log.error("ended by force: it did not end by itself", seconds=END_S)
-                logging.close()  # what was said last is read before the process is gone
+                logging.close()  # its reader has the last lines before the process is gone
                 os._exit(0 if served.is_set() else 1)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()

@@ -1,4 +1,4 @@
-"""How the daemon is: what `gesturectl status` shows, of which /readyz and the gauges of /metrics are parts."""
+"""The status of the daemon, which `gesturectl status` shows; /readyz and the gauges of /metrics are parts of it."""
 
 import os
 import time
@@ -17,7 +17,7 @@ HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 
 
 def status(parts: Parts) -> dict[str, Any]:
-    """The answer to `status`; durations in seconds, `time` and `started` in seconds since the Unix epoch."""
+    """The answer to the verb `status`; durations are in seconds, `time` and `started` in s since the Unix epoch."""
     now, metrics, ladder, shift = time.monotonic(), parts.metrics, parts.ladder, parts.desk.shift
     epoch, readings = time.time() - now, parts.readings()
     states = {name: reading.state for name, reading in readings.items()}
@@ -95,16 +95,16 @@ def healthy(parts: Parts) -> dict[str, Any]:
 
 
 def overall(states: Mapping[str, str], *, impaired: bool) -> str:
-    """The daemon's state by those of its sensors: "ok", "degraded" (where it is `impaired`) or "no_data"."""
+    """The daemon's state by those of its sensors: "ok", "degraded" (if it is `impaired`) or "no_data"."""
     if all(state in SILENT for state in states.values()):
         return "no_data"
     return "degraded" if impaired else "ok"
 
 
 def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
-    """One sensor as the status shows it at `now`, in monotonic s; with `epoch`, they are s since the Unix epoch.
+    """One sensor as the status shows it at `now`, in monotonic s; `now + epoch` is in s since the Unix epoch.
 
-    Nothing but ages is rounded: that would cost more than all else, and /metrics has these figures from here.
+    Only ages are rounded: rounding costs more than all else here, and /metrics shows the same figures.
     """
     gate = reading.gate
     shown = {
@@ -163,5 +163,5 @@ def _by_label(values: Mapping[tuple[str, ...], int]) -> dict[str, int]:
 
 
 def _ages(counter: Counter, now: float) -> dict[str, float]:
-    """By label, how many seconds ago a counter was last raised."""
+    """By label, how many seconds ago a dated counter was last raised."""
     return {" ".join(labels) or "all": round(now - last, 1) for labels, last in dict(counter.last).items()}

@@ -1,8 +1,8 @@
-"""Packets as they arrived, with the events they led to: for recordings, and for the flight recorder.
+"""Taps: packets as they arrived, with the events they led to, for recordings and for the flight recorder.
 
-A packet is kept as the bytes that came, before anything looked at them, with the time that the hub gave it: so
-a recording replays through the same code to the same events. Nothing is kept and nothing is copied as long as nobody
-taps and no flight recorder is set. A live tap is sent its lines soon after, so that no event waits for them.
+A packet is kept as the bytes that came, before they are decoded, with the time at which the hub got it, so that a
+recording replays through the same code to the same events. Nothing is kept or copied as long as nobody taps and no
+flight recorder is set. Lines are sent to a live tap only after a short while, so that no event waits for them.
 """
 
 import asyncio
@@ -22,9 +22,9 @@ from gestured.daemon.request import Connection
 
 KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
-SOON_S = 0.025  # how long a packet's line waits, so that packets of many sensors that came with it are answered first
-TURN_LINES = 32  # lines that are made and sent before the loop looks after its frames again
-GATE = b'{"type":"gate"'  # how a line begins that tells what a sensor listens to
+SOON_S = 0.025  # how long a packet's line waits, so that other sensors' packets that came with it are answered first
+TURN_LINES = 32  # lines that are made and sent before the loop serves frames again
+GATE = b'{"type":"gate"'  # how the line of a `Gate` begins
 Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 
@@ -40,7 +40,7 @@ class Taps:
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
         self.held_bytes = 0  # in the ring
         self._epoch_ns = 0  # of the live taps
-        # By sensor, the latest last: the line that said what it listened to where the ring begins.
+        # By sensor, the latest last: the line of the `Gate` that holds at the beginning of the ring.
         self._gates: dict[str, bytes] = {}
 
     @property
@@ -55,9 +55,9 @@ class Taps:
 
     @property
     def epoch_ns(self) -> int:
-        """Nanoseconds from 1970 to the 0 of the loop's clock. While anybody taps they stay as they are.
+        """Nanoseconds from 1970 to the 0 of the loop's clock; constant while anybody taps.
 
-        So the events of a recording stand where its packets do, even if the machine has slept meanwhile.
+        So the events of a recording keep their place among its packets, even if the machine has slept meanwhile.
         """
         return self._epoch_ns if self._live else time.time_ns() - time.monotonic_ns()
 
@@ -94,12 +94,12 @@ class Taps:
         return deque((*self._gates.values(), *(what for _, _, what in self._ring)))
 
     def tick(self) -> None:
-        """Tell slow readers what they lost, forget those that went; call it once a second."""
+        """Tell slow readers how many packets they lost, forget readers that are gone; call it once a second."""
         self._live = [connection for connection in self._live if not connection.closed]
         for connection in self._live:
             lost, connection.lost = connection.lost, 0
             if lost and not connection.send(messages.lost_json(lost)):
-                connection.lost += lost - 1  # the line that says so was no packet
+                connection.lost += lost - 1  # `send` has counted its own line, which is no packet
         self._forget(time.monotonic_ns())
 
     def _remember(self, t_ns: int, size: int, what: Remembered) -> None:
@@ -118,7 +118,7 @@ class Taps:
         self._timer = asyncio.get_running_loop().call_soon(self._turn) if self._waiting else None
 
     def _stream(self) -> None:
-        """Send all live taps the next few lines, at once: a write for each would cost more than what is written."""
+        """Send the next few lines to all live taps, in one write each, since a write for each line costs too much."""
         lines = list(islice(as_lines(self._waiting), TURN_LINES))
         text = b"".join(lines)
         for connection in self._live:
@@ -138,9 +138,9 @@ class Taps:
 
 
 def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:
-    """Packets and events as lines of the control socket. Each is taken out of `remembered`: what was sent is let go.
+    """Packets and events as lines of the control socket. Each is taken out of `remembered`, to free its memory.
 
-    A packet's line has its time in ns (monotonic), who sent it, and its bytes as base64.
+    A packet's line has its time in ns (monotonic), its source, and its bytes as base64.
     """
     while remembered:
         what = remembered.popleft()

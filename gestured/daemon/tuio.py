@@ -1,4 +1,4 @@
-"""TUIO 1.1 over UDP: fingers as cursors (`/tuio/2Dcur`), for programs that draw them. Each sensor is a source."""
+"""The TUIO 1.1 sink: fingers as cursors (`/tuio/2Dcur`) over UDP. Each sensor is a source of TUIO."""
 
 import socket
 from dataclasses import dataclass, field
@@ -8,9 +8,9 @@ from gestured.core.events import Event, Status, Touch
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sinks import UdpOut
 
-TUIO = "tuio"  # the scheme of such a destination
+TUIO = "tuio"  # the scheme of a TUIO destination
 CURSOR = "/tuio/2Dcur"
-IDS = 2**31  # session ids and frame numbers begin anew there: TUIO's are int32
+IDS = 2**31  # session ids and frame numbers begin anew here, since those of TUIO are int32
 
 
 @dataclass(slots=True)
@@ -43,7 +43,7 @@ class TuioSink(UdpOut):
         self._sessions = 0
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send where a finger is, or that it has left; and with the status which fingers are there."""
+        """Send where a finger is, or that it has left; with the status, which fingers are down."""
         if isinstance(event, Status):
             here = {name: one for name, one in self._sources.items() if name in event.sensors or one.cursors}
             self._sources = {name: Source() for name in event.sensors} | here
@@ -56,7 +56,7 @@ class TuioSink(UdpOut):
                 cursors.pop(key, None)
                 self._bundle(event.sensor)
                 return
-            if key not in cursors:  # down, or already there when this destination was named
+            if key not in cursors:  # came down just now, or before this destination was opened
                 cursors[key] = Cursor(self._sessions, event.t)
                 self._sessions = (self._sessions + 1) % IDS
             self._bundle(event.sensor, cursors[key], event)
@@ -75,7 +75,7 @@ class TuioSink(UdpOut):
         super().close()
 
     def _bundle(self, sensor: str, cursor: Cursor | None = None, moved: Touch | None = None) -> None:
-        """One frame of a sensor: who is there, and perhaps how one of them moved. TUIO's y grows downward."""
+        """Send a frame of a sensor: the fingers that are down, and perhaps how one moved. TUIO's y grows downward."""
         source = self._sources[sensor]
         alive = [one.session for one in source.cursors.values()]
         source.frames = (source.frames + 1) % IDS

@@ -1,10 +1,10 @@
-"""OSC over UDP in: reads the packets that wait in a socket, and hands them on with their times of arrival.
+"""The receiver of OSC over UDP: reads the packets that wait in a socket, and gives them to the hub with their arrivals.
 
-It is a reader of its own instead of a DatagramProtocol, for two reasons. It asks the kernel when each packet came, so
-that a stall of the loop, however long, moves no frame: what waited is served as if it had been read at once. And where
-packets come thick, as of hundreds of sensors, it reads them together each millisecond: that costs less.
+It is used in place of asyncio's DatagramProtocol for two reasons. It asks the kernel when each packet came, so that a
+stall of the loop, however long, changes no frame's time. And if packets come thick, as those of hundreds of sensors do,
+it reads them together each millisecond, which costs less.
 
-Work is done in slices: between two of them the loop serves everybody else.
+Work is done in slices, between which the loop serves everybody else.
 """
 
 import asyncio
@@ -27,16 +27,16 @@ from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
-SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
-FLOOD_SLICE_S = 0.001, 0.01  # of work on waiting packets in a flood, at least and at most; see `Receiver._slice`
-TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
+SLICE_S = 0.005  # s of work on waiting packets before the loop serves everybody else
+FLOOD_SLICE_S = 0.001, 0.01  # s of work on waiting packets in a flood, at least and at most; see `Receiver._slice`
+TURN_S = 0.05  # s, the most work in one turn of a flood, in case packets cost more than their senders' earlier ones
 DRAIN_S = 0.25  # for serving what still waits when the daemon ends
-PAUSE_S = 0.001  # between reads of packets that come thick, since waking for each is much of its price
-FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
-EARLY_S = 0.001  # by which we wake before a wait is over, since the loop's timers know whole milliseconds only
+PAUSE_S = 0.001  # between reads of packets that come thick, since waking for a packet is much of its cost
+FULL_S = 0.25  # s for which a stall explains that the kernel drops packets; if it drops them for longer, it is a flood
+EARLY_S = 0.001  # by which the alarm for a wait is set too early (or too late), since the loop's timers have whole ms
 REST = 2  # seconds that the loop has for everything else, for each second that is spent on provisional events
-SPARSE_S = 0.02  # between packets: where they are further apart, an answer's moment is waited for exactly
-STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
+SPARSE_S = 0.02  # between packets; if they are further apart, the alarm is early, and the end of a wait is met exactly
+STEP_S = 0.05  # by which the wall clock may move against the monotonic one; after a larger step, stamps are not used
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
 ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
@@ -54,29 +54,29 @@ class Receiver:
         taps: Taps,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Give `hub` the packets since the socket was `empty` (s), and its facts to `desk`; `taps` see the packets."""
+        """Give `hub` the packets since the socket was `empty` (s), its facts to `desk`, and all packets to `taps`."""
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
 
         def owned(source: Source) -> int:
-            return hub.owners.get(source, 0)  # each tick of the hub makes the table anew
+            return hub.owners.get(source, 0)  # looked up each time, since a tick of the hub makes a new table
 
         self._backlog, self._bunches = Backlog(owned), Bunches(owned)
         self._muted = Muted()
-        _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
-        self._empty = empty  # s: what arrived until then was read
-        # s: what arrived until then was served. Time must not decide beyond it: a sensor whose packets wait, read or
-        # in the socket behind those of others, is not silent.
+        _, self._wall = self._clocks()  # s, from the monotonic clock to the wall clock of the kernel's stamps
+        self._empty = empty  # s: packets that arrived until then were read
+        # s: packets that arrived until then were served. Nothing may be decided by a later time: a sensor is not silent
+        # while its packets wait here, or in the socket behind those of others.
         self.served = empty
-        self.behind_s = 0.0  # by which `served` was behind the clock at the last read
-        self._drops = 0  # packets that the kernel had dropped at the last look
+        self.behind_s = 0.0  # s by which the packets to be served were late at the last read, without bunches
+        self._drops = 0  # the kernel's count of dropped packets at the last look
         self._dropping = -FLOOD_S  # s, when the kernel began to drop packets
         self._looked = 0.0  # s, when we last looked whether something waits
         self._shared = 0.0  # s, when we last shared out work in a flood
-        self._sparse = False  # whether the last ones came after a pause
+        self._sparse = False  # whether the last packets came SPARSE_S or more after others
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
-        self._holding: asyncio.TimerHandle | None = None  # it reads again when the next bunch is complete
+        self._holding: asyncio.TimerHandle | None = None  # reads again when the next bunch is complete
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
         self._asking: asyncio.Handle | None = None
@@ -95,7 +95,7 @@ class Receiver:
         pause_s = now - self._looked
         thick, self._sparse, self._looked = pause_s < PAUSE_S, pause_s >= SPARSE_S, now
         self.read()
-        if thick and not self._backlog.flooded(now):  # in a flood nothing is put off
+        if thick and not self._backlog.flooded(now):  # in a flood no read is put off
             self._loop.remove_reader(self._sock)
             self._pause = self._loop.call_later(PAUSE_S, self._listen)
 
@@ -104,7 +104,7 @@ class Receiver:
         self._loop.add_reader(self._sock, self._wake)
 
     def drain(self) -> None:
-        """Serve everything that waits, for DRAIN_S at the most: the daemon ends."""
+        """Serve all packets that wait, for at most DRAIN_S, before the daemon ends."""
         end = self._clock() + DRAIN_S
         self.read()
         while self._again is not None and self._clock() < end:
@@ -112,7 +112,7 @@ class Receiver:
         self._release(math.inf)
 
     def read(self) -> None:
-        """Take what waits, and serve what a slice of time is enough for; the rest has its turn after everybody else."""
+        """Read the packets that wait, and serve as many as fit into a slice of time; the others have a later turn."""
         if self._again is not None:
             self._again.cancel()
             self._again = None
@@ -134,7 +134,7 @@ class Receiver:
             if alone:
                 self._serve(alone, now)
         if not full:
-            self._empty = began  # whatever is found next came later, also where we were stopped since
+            self._empty = began  # the packets of the next read came later, even if we were stopped since
         self._wall = wall
         if self._backlog:
             self._work(now)
@@ -147,7 +147,7 @@ class Receiver:
 
     def _put(self, found: list[Packet], arrivals: list[float], now: float) -> None:
         """Put packets with these arrivals (s) into the backlog, but for those that are held back for their bunch."""
-        if self._backlog.flooded(now):  # what comes is too much already: no bunch is waited for
+        if self._backlog.flooded(now):  # too much comes already to hold packets back
             for bunch in self._bunches.over(math.inf):
                 self._backlog.add(bunch.packets, bunch.arrivals)
             self._backlog.add(found, arrivals)
@@ -174,7 +174,7 @@ class Receiver:
     def _receive(self) -> tuple[list[Packet], list[bytes], bool]:
         """(packets with their sources, the kernel's time of each, whether some may be left in the socket).
 
-        Others have their turn after GROUP packets.
+        It reads at most GROUP packets, so that others have their turn.
         """
         receive = self._sock.recvmsg
         found, stamps = list[Packet](), list[bytes]()
@@ -185,12 +185,12 @@ class Receiver:
                 stamps.append(ancillary[0][2] if ancillary else b"")
         except (BlockingIOError, InterruptedError):
             return found, stamps, False
-        except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
+        except (OSError, MemoryError) as error:  # the network reports something else; the socket can still be read
             self._desk.drop("socket_error", error=str(error))
         return found, stamps, True
 
     def _arrival(self, stamp: bytes, now: float) -> float:
-        """When a packet came, in s of the monotonic clock: after the socket was empty, and not after `now`."""
+        """When a packet came, in s of the monotonic clock: not before the socket was empty, and not after `now`."""
         if len(stamp) != TIMESTAMP.size:
             return now
         seconds, nanoseconds = TIMESTAMP.unpack(stamp)
@@ -198,9 +198,9 @@ class Receiver:
         return min(now, max(self._empty, came))
 
     def _arrivals(self, stamps: list[bytes], now: float) -> list[float]:
-        """When the packets with these times came, as `_arrival` tells of one; they never go back."""
+        """When the packets with these stamps came, by the rule of `_arrival`; the times never decrease."""
         joined = b"".join(stamps)
-        if len(joined) == TIMESTAMP.size * len(stamps):  # all at once, since each packet has one
+        if len(joined) == TIMESTAMP.size * len(stamps):  # each packet has a stamp
             seconds, nanoseconds = np.frombuffer(joined, np.int64).reshape(-1, 2).T
             came = np.minimum(now, np.maximum(self._empty, seconds + nanoseconds / 1e9 - self._wall))
         else:
@@ -209,7 +209,7 @@ class Receiver:
         return arrivals
 
     def _work(self, now: float) -> None:
-        """Serve what waits for as long as a slice lasts."""
+        """Serve packets of the backlog for a slice of time."""
         if self._backlog.flooded(now):
             self._work_fairly(now)
             return
@@ -220,7 +220,7 @@ class Receiver:
 
     def _work_fairly(self, now: float) -> None:
         served, dropped = self._backlog.share(self._slice(now), now)
-        start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
+        start = before = time.thread_time()  # processor time, since no sender is to blame if we have to wait for it
         for n, group in enumerate(served):
             if before > start + TURN_S:
                 for packet, source in chain.from_iterable(left.packets for left in served[n:]):
@@ -236,20 +236,20 @@ class Receiver:
             if blamed := self._muted.blame(dropped, now, self._hub.owners):
                 self._desk.muted(blamed)
                 self._mute(now, blamed)
-                self._backlog.flood(now + LONGEST_S + FLOOD_S)  # those who are heard again are held back at once
+                self._backlog.flood(now + LONGEST_S + FLOOD_S)  # senders that are heard again are limited at once
 
     def _slice(self, now: float) -> float:
-        """For how long to work in this turn of a flood, in s.
+        """The duration of the work in this turn of a flood, in s.
 
         The kernel's buffer fills meanwhile, but packets that are served together cost a fraction. So work goes on until
-        half of what a read takes has come again, but not where the last read may have left some in the socket.
+        half of what a read takes has come again, unless the last read may have left packets in the socket.
         """
         least, most = FLOOD_SLICE_S
         full, since, self._shared = self._backlog.full, now - self._shared, now
         return min(max(since / 2 / full, least), most) if full < 1 else least
 
     def _mute(self, now: float, changed: Sequence[Sender]) -> None:
-        """Have the kernel throw away what comes from senders of a flood: unread, it fills the socket's buffer."""
+        """Have the kernel drop packets of muted senders, which would fill the socket's buffer before they are read."""
         if changed:
             try:
                 mute(self._sock, self._muted.rules(now, self._hub.owners))
@@ -263,14 +263,14 @@ class Receiver:
         self._expect()
 
     def _ask(self) -> None:
-        """Have the model name one segment before its answer is due; whoever waits in the loop has a turn after it."""
+        """Have the model classify one segment before its answer is due; then everybody else in the loop has a turn."""
         self.read()
         if self._again is None:
             self._desk.take(self._hub.ask(self._clock()))
         self._asking = self._loop.call_soon(self._ask) if self._hub.asks else None
 
     def _foresee(self) -> None:
-        """Give a provisional event where nothing else is to be done: it costs a run of the model, and answers wait."""
+        """Give a provisional event if nothing else is to be done, since it takes a run of the model."""
         self.read()
         took_s = 0.0
         if self._again is None:
@@ -281,7 +281,7 @@ class Receiver:
         self._foreseeing = self._loop.call_later(pause_s, self._foresee) if self._hub.looks else None
 
     def _expect(self) -> None:
-        """Set the alarm for when time alone decides something. Packets that wait are served before."""
+        """Set the alarm for the moment when time alone decides something. Packets that wait are served before it."""
         if self._hub.asks and self._asking is None:
             self._asking = self._loop.call_soon(self._ask)
         if self._hub.looks and self._foreseeing is None:
@@ -294,13 +294,13 @@ class Receiver:
                 self._alarm = self._loop.call_later(max(woken - self._clock(), 0.0), self._wait)
 
     def _wait(self) -> None:
-        """Decide what is due. Where that is a millisecond off, come back each turn: the loop serves everybody else."""
+        """Decide what is due. A millisecond before, come back in each turn of the loop, which serves everybody else."""
         if self._clock() < self._due:
             self._alarm = self._loop.call_soon(self._wait)
         else:
             self.read()
             self._desk.take(self._hub.wait(self.served))
-            self._forget_alarm()  # of what the packets that were just read began, and that is decided by now, too
+            self._forget_alarm()  # `read` may have set an alarm for what is decided by now, too
             self._expect()
 
     def _forget_alarm(self) -> None:
@@ -315,7 +315,7 @@ class Receiver:
             return
         self._drops = drops
         self._hub.missed()
-        if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # it drops again: more comes than we can read
+        if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # it still drops: more comes than we can read
             self._backlog.flood(now + FLOOD_S)
         elif now > self._dropping + FLOOD_S:
             self._dropping = now

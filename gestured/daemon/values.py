@@ -1,4 +1,4 @@
-"""The types of settings: how a value is written, and what was expected where it is written otherwise."""
+"""The types of settings: how a value is written, and what was expected if it is written otherwise."""
 
 import ipaddress
 import os
@@ -11,9 +11,9 @@ from pydantic import BeforeValidator, ValidationInfo
 from gestured.client.address import SOCKET_PATH, SOCKET_PATH_BYTES, named
 from gestured.core.address import Address, Grid, is_sensor
 
-SCHEMES = ("osc", "tuio")  # in which events are sent
+SCHEMES = ("osc", "tuio")  # of destinations
 SWITCH, NUMBER, COUNT = "true or false", "a number", "a whole number"
-# What was expected, by pydantic's type of an error, where pydantic's own message speaks of Python's types.
+# What was expected, by pydantic's type of an error, for errors whose own message speaks of Python's types.
 WORDS = {
     "tuple_type": "a list",
     "string_too_short": "a text that is not empty",
@@ -35,7 +35,7 @@ class Destination(NamedTuple):
 
 
 def expected(problem: Mapping[str, Any]) -> str:
-    """What was expected, in words that follow a comma or a colon: of one of the `errors()` of a ValidationError."""
+    """What was expected, in words that follow a comma or a colon; `problem` is from a ValidationError's `errors()`."""
     if words := WORDS.get(problem["type"]):
         return f"expected {words}"
     ours = problem["type"] == "value_error"
@@ -45,7 +45,7 @@ def expected(problem: Mapping[str, Any]) -> str:
 
 
 def _text(value: object) -> str:
-    """The text itself; of anything else an empty one, which is never what was expected."""
+    """A text as it is; for any other value an empty text, which is never what was expected."""
     return value if isinstance(value, str) else ""
 
 
@@ -92,9 +92,9 @@ def _network(value: object) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
 
 
 def _typed(expected: str) -> BeforeValidator:
-    """No text and no `true` passes for a number, as they would for pydantic; flags and variables hold nothing but text.
+    """A check that refuses texts, and `true` for a number, both of which pydantic would convert.
 
-    The keys that these gave are the context of a validation.
+    Flags and variables hold nothing but text; the context of a validation has the keys that they gave.
     """
 
     def checked(value: object, field: ValidationInfo) -> object:

@@ -1,7 +1,7 @@
-"""What clients that look on are sent: views of sensors, all events and the daemon's state, made once for all.
+"""The views for clients that look on: pictures of sensors, events and the daemon's state, made once for all of them.
 
-Nothing is made where nobody looks. What is made is made soon after the frames that it shows have been answered, and
-is sent in few writes: who acts on an event waits neither for a picture nor for who looks at one.
+Nothing is made if nobody looks. A view is made soon after the frames that it shows have been answered, and is sent in
+few writes, so that no client that acts on an event waits for it.
 """
 
 import asyncio
@@ -17,22 +17,22 @@ from gestured.daemon.request import Connection, Reply
 from gestured.daemon.tap import SOON_S
 
 VIEW_S = 1 / 30  # between two views of one sensor, since nobody sees more than 30 a second
-UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, it misses views until it has read them
+UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; while more wait, it misses views
 
 
 class Views:
-    """Views for those who look on."""
+    """The connections that look at sensors, and what is to be sent to them."""
 
     def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
         """`state` gives the daemon's state; `changed` is called when other sensors are looked at than before."""
         self._hub, self._state, self._changed = hub, state, changed
-        # By connection: the sensors that it looks at, and whether at their counts as they were sent, too.
+        # By connection: the sensors that it looks at, and whether it also wants their counts as they were sent.
         self._looks: dict[Connection, tuple[frozenset[str], bool]] = {}
-        self._due: set[str] = set()  # sensors that are looked at and have sent frames since
-        self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
+        self._due: set[str] = set()  # sensors that are looked at and have sent frames since their last view
+        self._said: list[tuple[Event, float, bool]] = []  # events that wait to be sent, as published
         self._state_due = False
         self._timer: asyncio.Handle | None = None
-        self._shown = -math.inf  # s, when a round of views began
+        self._shown = -math.inf  # s, when the last round of views began
 
     @property
     def sensors(self) -> frozenset[str]:
@@ -49,7 +49,7 @@ class Views:
         self._expect(sensors)
 
     def see(self, facts: Sequence[Fact]) -> None:
-        """Take note of which sensors sent something."""
+        """Note which sensors have sent frames."""
         if self._looks:
             arrived = {name for fact in facts if isinstance(fact, Arrived) for name in fact.sensors}
             self._expect(self.sensors & arrived)
@@ -85,7 +85,7 @@ class Views:
         self._go_on(sorted(self._due))
 
     def _go_on(self, sensors: list[str]) -> None:
-        """Show one more thing to all who look; the next one has its turn after the frames that wait."""
+        """Send one more view, or the state, to all who look; the next one has its turn after the frames that wait."""
         self._timer = None
         if sensors:
             self._show(sensors.pop())
@@ -98,7 +98,7 @@ class Views:
             self._expect(())
 
     def _tell_events(self) -> None:
-        """Tell each connection what happened, in one write."""
+        """Send each connection the events that wait, in one write."""
         said, self._said = self._said, []
         lines = [(event, to_json(event, epoch, test=test)) for event, epoch, test in said]
         for connection, (sensors, _) in self._looks.items():
@@ -128,5 +128,5 @@ class Views:
 
 
 def _hears(sensors: frozenset[str], event: Event) -> bool:
-    """Whether who looks at these sensors is told of an event: of guesses and fingers, only those of the sensors."""
+    """Whether a connection that looks at these sensors gets an event: guesses and fingers of others are left out."""
     return not isinstance(event, Provisional | Touch) or event.sensor in sensors
