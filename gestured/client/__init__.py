@@ -1,1 +1,1 @@
-"""What talks to a running daemon from outside: shared by gesturectl and the lab."""
+"""The client side of a running daemon, shared by gesturectl, the bridges and the lab."""

@@ -1,4 +1,4 @@
-"""Where the Unix sockets of a daemon are, unless a setting names them; and why an address cannot be had."""
+"""The addresses of a daemon: where its Unix sockets are if no setting names them, and why one cannot be bound."""
 
 import errno
 import os
@@ -14,13 +14,13 @@ SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of r
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 SOCKET_PATH = f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long"
 UNIX_SOCKETS = Path("/proc/net/unix")
-LISTENS = "00010000"  # the flag of a listening socket there
+LISTENS = "00010000"  # the flags of a listening socket in UNIX_SOCKETS
 
 
 def named(text: str) -> Address:
     """HOST:PORT, of a host that can be looked up. ValueError, which says what was expected, for anything else.
 
-    A name that cannot be written for a look-up, such as `a..b`, would raise UnicodeError later, where it is used.
+    A name that cannot be encoded for a look-up, such as `a..b`, would raise UnicodeError only when it is used.
     """
     address = Address.parse(text)
     try:
@@ -34,7 +34,7 @@ def named(text: str) -> Address:
 def default_socket(environ: Mapping[str, str]) -> Path:
     """The event socket of a daemon without that setting: in the folder of systemd, of the session, or of root.
 
-    Raises SettingsError where there is no such folder.
+    Raises SettingsError if there is no such folder.
     """
     if directory := environ.get("RUNTIME_DIRECTORY"):
         return Path(directory.split(":")[0]) / "events.sock"
@@ -54,17 +54,16 @@ def control_beside(socket: Path) -> Path:
 
 
 def find_socket(environ: Mapping[str, str]) -> Path:
-    """The event socket that is meant where none is named, the first of these.
+    """The event socket of a client that names none. Raises SettingsError if there is none.
 
-    The one that the environment names, as the daemon reads it; that of a daemon in the session; the installed
-    service's; the one that a daemon would make. `client.peer` checks who serves it. Raises SettingsError where there is
-    none.
+    It is the first of these: the socket that the daemon's variable or configuration names; that of a daemon in the
+    session; that of the installed service; the one that a daemon would make. `client.peer` checks who serves it.
     """
     if path := setting(environ, "socket"):
-        if not Path(path).name:  # beside which no control socket can be
+        if not Path(path).name:  # a control socket beside it needs a name
             raise SettingsError(f"GESTURED_SOCKET: expected {SOCKET_PATH}, found {path!r}")
         return Path(path)
-    # Unlike Path.exists, os.path.exists raises no error where we may not look.
+    # Unlike Path.exists, os.path.exists raises no error if we may not look.
     installed = SYSTEM.parent.is_dir() and not environ.get("RUNTIME_DIRECTORY")
     if installed and not (environ.get("XDG_RUNTIME_DIR") and os.path.exists(default_socket(environ))):
         return SYSTEM
@@ -72,7 +71,7 @@ def find_socket(environ: Mapping[str, str]) -> Path:
 
 
 def find_control(environ: Mapping[str, str]) -> Path:
-    """The control socket that is meant where none is named, by the rules of `find_socket`."""
+    """The control socket of a client that names none, by the rules of `find_socket`."""
     if path := setting(environ, "control"):
         return Path(path)
     return control_beside(find_socket(environ))
@@ -99,7 +98,7 @@ def look_up(address: tuple[str, int], kind: int) -> tuple[int, Any]:
 
 
 def bind_failure(error: OSError, address: Address, kind: int) -> str:
-    """Why an address of this kind of socket cannot be bound, and where it is taken, what shows by whom."""
+    """Why an address of this kind of socket cannot be bound; if it is taken, also the command that shows by whom."""
     reason = error.strerror or str(error)
     flags = "-ulpn" if kind == socket.SOCK_DGRAM else "-tlpn"
     taken = error.errno == errno.EADDRINUSE
@@ -107,16 +106,16 @@ def bind_failure(error: OSError, address: Address, kind: int) -> str:
 
 
 def setting(environ: Mapping[str, str], key: str) -> str | None:
-    """A setting of the daemon, from its variable or from the file of GESTURED_CONFIG; None where neither has it."""
+    """A setting of the daemon, from its variable or from the file of GESTURED_CONFIG; None if neither has it."""
     if value := environ.get(f"GESTURED_{key.upper()}"):
         return value
     if not (path := environ.get("GESTURED_CONFIG")):
         return None
-    import tomllib  # it takes longer to import than all the rest
+    import tomllib  # this import takes longer than all others here
 
     try:
         with open(path, "rb") as file:
             value = tomllib.load(file).get(key)
-    except (OSError, ValueError):  # the daemon says what is wrong with the file
+    except (OSError, ValueError):  # the daemon itself reports what is wrong with the file
         return None
     return value if isinstance(value, str) else None

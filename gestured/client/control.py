@@ -1,4 +1,4 @@
-"""A client of the daemon's control socket: a verb is asked, and an answer comes."""
+"""A client of the daemon's control socket, which sends verbs and reads their answers."""
 
 import json
 import socket
@@ -15,18 +15,18 @@ ANSWER_TIMEOUT_S = 20.0  # a reload opens and tests a model; everything else tak
 
 
 class Control(Lines):
-    """One connection to a control socket. Raises Unreachable where no daemon answers."""
+    """One connection to a control socket. Raises Unreachable if no daemon answers."""
 
     def __init__(self, path: Path, patience_s: float = ANSWER_TIMEOUT_S) -> None:
-        """`patience_s` is how long an answer may take."""
+        """Connect to `path`; `patience_s` is how long an answer may take. Raises as `Lines`."""
         super().__init__(path, "--control")
         self._patience_s = patience_s
         self.finished = False  # whether `finish` was called
 
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
-        """The daemon's answer to a verb. Raises Refused with its reason, Unreachable where no answer comes."""
+        """The daemon's answer to a verb. Raises Refused with the daemon's reason, Unreachable if no answer comes."""
         request = {"verb": verb} | parameters
-        with suppress(OSError):  # the daemon hung up; the reason that it gave before that is read below
+        with suppress(OSError):  # the daemon hung up; the reason that it sent before is read below
             self.socket.sendall(json.dumps(request).encode() + b"\n")
         self.socket.settimeout(self._patience_s)
         try:
@@ -45,7 +45,7 @@ class Control(Lines):
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Read the daemon's lines inside of this: what is missing or odd in one, as of another version, is Refused."""
+        """A context in which lines are read: one with a missing or odd part, as of another version, raises Refused."""
         try:
             yield
         except (KeyError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:

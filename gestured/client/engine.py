@@ -1,4 +1,4 @@
-"""A real daemon of one's own: a process, free ports, a socket in a temporary folder."""
+"""An engine: a real daemon as a child process, with free ports, and a socket in a temporary folder."""
 
 import json
 import os
@@ -13,13 +13,13 @@ import gestured
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-STOP_S = 5.0  # that the daemon may take to end
-# A program that is killed cannot end its children, so the kernel is told to (on Linux). PR_SET_PDEATHSIG, SIGTERM.
+STOP_S = 5.0  # s that the daemon may take to end
+# A program that is killed cannot end its children, so Linux is told to end them: PR_SET_PDEATHSIG, SIGTERM.
 DIE = "import ctypes; ctypes.CDLL(None).prctl(1, 15); " if sys.platform == "linux" else ""
 
 
 def child_of_ours(module: str) -> list[str]:
-    """The beginning of a command line that runs a module of gestured's, and ends when we do, however we end."""
+    """The beginning of a command that runs a module of gestured in a child process, which ends when we do."""
     root = Path(gestured.__file__).parent.parent
     safe = [] if root.samefile(".") else ["-P"]  # a folder named gestured in the current one is not the package
     run = f"{DIE}import runpy; runpy.run_module('{module}', run_name='__main__', alter_sys=True)"
@@ -27,7 +27,7 @@ def child_of_ours(module: str) -> list[str]:
 
 
 class Engine:
-    """`gestured` as a child process; a context manager. Raises GesturedError where it does not start."""
+    """`gestured` as a child process; a context manager. Raises GesturedError if it does not start."""
 
     def __init__(self, model: str, rows: int, columns: int, *more: str) -> None:
         """Start the daemon with a grid of rows x columns; `more` are further flags of its command line."""

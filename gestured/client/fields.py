@@ -1,4 +1,4 @@
-"""Whether a daemon's line has the fields that the protocol gives it: a peer may have a bug, or be no daemon at all."""
+"""The check that a daemon's line has the fields of the protocol: a peer may have a bug, or be no daemon at all."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
@@ -7,8 +7,8 @@ from typing import Any, get_args, get_type_hints
 from gestured.core.events import Event, Place, Where
 from gestured.core.messages import STREAM_TIMES, quoted
 
-LARGEST = 1e300  # of all numbers: counts of a sensor may be nearly any
-LONGEST_S = 6e10  # the largest time in a line: Python's calendar knows none further from 1970, some 1900 years
+LARGEST = 1e300  # of all numbers, since counts of a sensor may be very large
+LONGEST_S = 6e10  # s from 1970, the most for a time in a line: some 1900 years, which Python's calendar can still show
 TIMES = STREAM_TIMES | {"time"}
 
 
@@ -17,7 +17,7 @@ def _is(*types: type) -> Callable[[Any], bool]:
 
 
 def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < LARGEST  # neither NaN nor infinite
+    return type(value) in (int, float) and abs(value) < LARGEST  # false for NaN and infinities
 
 
 def _object(of: Callable[[Any], bool]) -> Callable[[Any], bool]:
@@ -48,7 +48,7 @@ def _is_gates(value: Any) -> bool:
 
 _WHERE = get_type_hints(Where)
 GATES = Mapping[str, Mapping[str, Any]]
-# How a field is annotated -> whether a value is one, and what it is called.
+# The annotation of a field -> whether a value fits it, and the words for such a value.
 _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     str: (_is(str), "a text"),
     int: (_is(int), "a whole number"),
@@ -66,9 +66,9 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     GATES: (_object(_is_gates), "an object of objects with armed, closed and until"),
     Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
 }
-_ANY: dict[str, Any] = {"type": str, "sensor": str} | dict.fromkeys(sorted(TIMES), float | None)  # of any line
+_ANY: dict[str, Any] = {"type": str, "sensor": str} | dict.fromkeys(sorted(TIMES), float | None)  # of any
 _EVENTS = {event.__name__.lower(): event for event in get_args(Event)}
-# Type of a line -> its fields, as they are annotated.
+# Type of a line -> its fields, each with its annotation.
 _FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, event in _EVENTS.items()} | {
     "hello": dict.fromkeys(("version", "instance", "model"), str)
     | {"gestures": list[str], "sensors": Mapping[str, int], "gates": GATES},
@@ -83,10 +83,10 @@ _ADDED = {
 
 
 def wrong_field(line: Mapping[str, Any]) -> str | None:
-    """What is wrong with a daemon's line, such as `decided "soon": expected a number`; None where it is sound.
+    """What is wrong with a daemon's line, such as `decided "soon": expected a number`; None if it is sound.
 
-    A newer daemon may say more, so unknown fields are passed over, but for times, which may be null; of a line of
-    unknown type these and `sensor` count.
+    A newer daemon may say more, so unknown fields are ignored. The type, the sensor and all times are checked in a line
+    of any type, even an unknown one; the times may be null.
     """
     name = line.get("type")
     known = _FIELDS.get(name, {}) if isinstance(name, str) else {}

@@ -31,7 +31,7 @@ class Refused(GesturedError):
 
 
 class Unsubscribed(Refused):
-    """The daemon refused what a client asked to hear."""
+    """The daemon refused the subscription of a client."""
 
 
 class Lines:
@@ -40,7 +40,7 @@ class Lines:
     def __init__(self, path: Path, flag: str) -> None:
         """Connect to `path`; `flag` is the option that an error names. Raises Unreachable (or Forbidden), Stranger.
 
-        A daemon whose queue is full is not waited for. GesturedError for what can be no socket's path.
+        It does not wait for a daemon whose queue is full. Raises GesturedError for a path that no socket can have.
         """
         if "\0" in str(path) or len(os.fsencode(path)) > SOCKET_PATH_BYTES:
             raise GesturedError(f"{str(path)!r}: expected {SOCKET_PATH}")
@@ -92,7 +92,7 @@ def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
 
     def read() -> None:
         try:
-            with suppress(GesturedError):  # whoever waits for the next line is told that there is none
+            with suppress(GesturedError):  # the reader of the queue finds the end of the lines
                 for line in lines:
                     waiting.put(line)
         finally:

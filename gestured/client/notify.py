@@ -1,4 +1,4 @@
-"""What a service tells systemd (sd_notify). It does nothing without $NOTIFY_SOCKET."""
+"""The messages of a service to systemd (sd_notify). Without $NOTIFY_SOCKET nothing is sent."""
 
 import os
 import socket

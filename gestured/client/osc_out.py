@@ -1,4 +1,4 @@
-"""OSC that goes out, built by python-osc; what comes in is decoded by `core.osc`."""
+"""OSC messages and bundles to send, built by python-osc; `core.osc` decodes those that arrive."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -10,7 +10,7 @@ from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 HEADS = 1024  # heads of messages that are remembered; a sensor has one or two
-FROM_1900_S = 2_208_988_800  # to 1970: a time tag counts from 1900, in units of 2**-32 s
+FROM_1900_S = 2_208_988_800  # s from 1900, where time tags begin, to 1970; their unit is 2**-32 s
 
 _size, _tag = Struct(">i").pack, Struct(">Q").pack
 
@@ -34,8 +34,8 @@ def bundle(*messages: OscMessage) -> OscBundle:
 def dated(moment: float, *elements: bytes) -> bytes:
     """A bundle with the time tag `moment`, in seconds since the Unix epoch.
 
-    The elements are taken as they are: python-osc parses what a bundle is given, which would take longer than all else
-    for a frame, and raise for what a tape has of a sensor that sends nonsense.
+    The elements are taken as they are. python-osc would parse them, which takes longer than all else for a frame, and
+    would raise an error for the nonsense of a faulty sensor on a tape.
     """
     since_1900 = (round(moment * 2**32) + (FROM_1900_S << 32)) % 2**64  # in 2036 the count begins anew
     return b"".join((b"#bundle\0", _tag(since_1900), *(part for one in elements for part in (_size(len(one)), one))))

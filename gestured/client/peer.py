@@ -1,7 +1,7 @@
-"""Which account serves a Unix socket, and whether a client trusts it.
+"""The peer of a client: which account serves a Unix socket, and whether the client trusts it.
 
-A client shows what a daemon says, and opens files that it names. So it asks nothing of a stranger: a path says where a
-daemon should be, not who is there.
+A client shows what a daemon says, and opens files that the daemon names. So a client asks nothing of a stranger: a path
+says where a daemon should be, but not who is there.
 """
 
 import os
@@ -23,7 +23,7 @@ class Stranger(GesturedError):
 def check_peer(connected: socket.socket, path: Path, flag: str) -> None:
     """Raises Stranger unless `path` is served by root, by ourselves, or by the account that root gave its folder to.
 
-    The kernel says who made the socket listen, whatever stands at the path by now. An error names the option `flag`.
+    The kernel says which account made the socket listen, whatever is at `path` now. An error names the option `flag`.
     """
     credentials = connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
     _, uid, _ = CREDENTIALS.unpack(credentials)
@@ -35,9 +35,9 @@ def check_peer(connected: socket.socket, path: Path, flag: str) -> None:
 
 
 def _given_to(folder: Path) -> int | None:
-    """The account that owns a folder which only root can have put there; None where anybody else could have.
+    """The account that owns a folder which only root can have put there; None if anybody else could have.
 
-    So each folder above it must be root's, and nobody else's to write into. Links are not followed.
+    So each folder above it must belong to root, and nobody else may write into it. Links are not followed.
     """
     try:
         found = folder.lstat()

@@ -1,4 +1,4 @@
-"""The command line of programs with subcommands: their help, and the sentence where one fails."""
+"""The command line of programs with subcommands: their help, and the sentence if a subcommand fails."""
 
 import argparse
 import os
@@ -19,12 +19,12 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter} | options)
 
 
-# Where subcommands add themselves; argparse has no public name for it.
+# The object to which subcommands add themselves; argparse has no public name for its type.
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser, Commands]:
-    """The command line of a program, and where its subcommands, each called a `kind`, add themselves and set `run`."""
+    """The command line of a program, and the object to which its subcommands, each a `kind`, add themselves."""
     more = f"`{name} {kind} --help` explains one {kind.lower()}, with examples."
     parser = Parser(prog=name, description=description, epilog=f"{epilog}\n\n{more}")
     parser.add_argument("--version", action="version", version=f"{name} {gestured.__version__}")
@@ -32,8 +32,8 @@ def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser
 
 
 def run(parser: Parser, argv: Sequence[str] | None) -> int:
-    """Run the subcommand that is asked for: its exit status, 0 after Ctrl-C, 1 and a sentence where it fails."""
-    # A stream that was closed when we began is None.
+    """Run the subcommand of `argv`. Returns its exit status, 0 after Ctrl-C, 1 with a sentence for a GesturedError."""
+    # A stream is None if it was closed when the process began.
     sys.stdout = sys.stdout or open(os.devnull, "w")
     sys.stderr = sys.stderr or open(os.devnull, "w")  # else `print` would write its sentences to standard output
     args = parser.parse_args(argv)
@@ -52,7 +52,7 @@ def run(parser: Parser, argv: Sequence[str] | None) -> int:
 
 
 def _give_up(stream: TextIO) -> None:
-    """Write what a stream still holds, or drop it: else Python tries again as it exits, and exits with status 120."""
+    """Flush a stream, or drop what it holds: else Python tries again when it exits, and exits with status 120."""
     try:
         stream.flush()
     except OSError:

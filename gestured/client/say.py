@@ -1,7 +1,7 @@
-"""How programs print: text that somebody else chose is shown, and never acts on the terminal.
+"""The printing of the programs: text that somebody else chose is shown, and never acts on the terminal.
 
-Names come from packets, sockets and files, and whoever chose them may have chosen what a terminal acts upon. So the
-programs print through this module alone.
+Names come from packets, sockets and files, and may hold control sequences of terminals. So the programs print through
+this module alone.
 """
 
 import json
@@ -11,14 +11,14 @@ from typing import TextIO
 
 from gestured.core.errors import GesturedError
 
-MOST = 2000  # characters of a line at most: none of our own is longer, unless a path in it is
+MOST = 2000  # characters of a line at most; none of our own is longer, unless it has a long path
 
 
 def shown(text: object, most: int = MOST) -> str:
-    """Foreign text on one line of at most `most` printable characters; ordinary text is as it was.
+    """Foreign text on one line of at most `most` printable characters; ordinary text is not changed.
 
-    Control characters, line breaks, surrogates and what is invisible or turns the direction of writing are escaped as
-    in Python. Of longer text the middle is left out: both the name before it and the reason after it stay.
+    Control characters, line breaks, surrogates, and characters that are invisible or turn the direction of writing are
+    escaped as in Python. The middle of a longer text is left out, so that its name and its reason stay.
     """
     told = str(text)
     if len(told) > 2 * most:
@@ -37,7 +37,7 @@ def say(*lines: object, to: TextIO | None = None) -> None:
 
 
 def say_json(value: object) -> None:
-    """Print a value as one line of JSON. It is ASCII: whatever else a text holds is escaped."""
+    """Print a value as one line of JSON, in ASCII; all other characters are escaped."""
     say_drawn(json.dumps(value))
 
 
@@ -52,8 +52,8 @@ def tell(as_json: bool, value: object, *lines: object) -> None:
 def say_drawn(text: str, end: str = "\n", to: TextIO | None = None) -> None:
     """Print text with line breaks, colours or a picture; foreign text in it must have gone through `shown`.
 
-    Standard error that takes no more, as a log on a full disk, stops nothing. Raises GesturedError where standard
-    output does not, but BrokenPipeError where its reader has gone.
+    If standard error takes no more, such as a log on a full disk, nothing is raised. If standard output takes no more,
+    this raises GesturedError, or BrokenPipeError if its reader has gone.
     """
     if to is not None and to is sys.stderr:
         with suppress(OSError):

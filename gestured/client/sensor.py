@@ -1,4 +1,4 @@
-"""A simulated sensor's firmware: frames and finger positions as OSC packets, sent at their times over UDP."""
+"""The firmware of a simulated sensor: frames and finger positions as OSC packets, sent at their times over UDP."""
 
 import errno
 import os
@@ -28,14 +28,14 @@ BLOBS: dict[str, np.dtype[Any]] = {
 
 @dataclass(frozen=True)
 class Form:
-    """How a simulated sensor writes its frames. `values` is "floats", "ints" or one of BLOBS; `plain` has no bundle."""
+    """The form of a simulated sensor's packets. `values` is "floats", "ints" or one of BLOBS; `plain` has no bundle."""
 
     sensor: str
     values: str = "floats"
     plain: bool = False
 
     def packet(self, frame: Frame, counter: int, moment: float) -> bytes:
-        """One packet: pressure with the counter and the touches, in a bundle of the epoch time `moment`."""
+        """The packet of a frame: pressure with the counter, and touches, in a bundle of the epoch time `moment` (s)."""
         pressure = self._pressure(frame.values, None if self.plain else counter)
         if self.plain:
             return pressure
@@ -44,7 +44,7 @@ class Form:
     def _pressure(self, values: NDArray[np.generic], counter: int | None) -> bytes:
         address = f"/{self.sensor}/pressure"
         flat = np.ravel(values)
-        types, args = ("", []) if counter is None else ("i", [(counter + 2**31) % 2**32 - 2**31])  # it overflows
+        types, args = ("", []) if counter is None else ("i", [(counter + 2**31) % 2**32 - 2**31])  # wraps
         if self.values in ("floats", "ints"):
             tag, numbers = ("f", flat.astype(">f4")) if self.values == "floats" else ("i", np.rint(flat).astype(">i4"))
             head = osc_out.head(address, types + tag * flat.size)
@@ -62,7 +62,7 @@ class Form:
 
 
 def connected(to: tuple[str, int]) -> socket.socket:
-    """A UDP socket that sends to an address. Raises GesturedError where it is none."""
+    """A UDP socket that sends to an address. Raises GesturedError if the address cannot be used."""
     try:
         family, where = look_up(to, socket.SOCK_DGRAM)
         sock = socket.socket(family, socket.SOCK_DGRAM)
@@ -73,10 +73,10 @@ def connected(to: tuple[str, int]) -> socket.socket:
 
 
 def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
-    """Send on a connected UDP socket; whether a closed port has refused an earlier packet.
+    """Send on a connected UDP socket. Returns whether a closed port has refused an earlier packet.
 
-    The system says so instead of sending, once for each refusal. A socket that was connected also keeps this machine's
-    address of then: where that is gone, a new one takes its place. Raises OSError where a packet cannot be sent.
+    The kernel reports each refusal once, instead of sending. A connected socket also keeps this machine's address of
+    the time when it was connected; if that is gone, a new socket takes its place. Raises OSError if sending fails.
     """
     try:
         sock.send(packet)
@@ -94,19 +94,19 @@ def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
 
 
 class Sensor:
-    """Sends frames at the pace of their times, in seconds from the first one. Raises GesturedError for no address."""
+    """Sends frames at their times, in seconds from `start`. Raises GesturedError if the address cannot be used."""
 
     def __init__(self, to: tuple[str, int], form: Form) -> None:
         self.socket = connected(to)
         self.to, self.form = Address(*to), form
         self.sent = 0
-        self.unheard = 0  # packets to which a closed port answered
+        self.unheard = 0  # packets that a closed port has refused
         self.start = time.monotonic()
         self.epoch = time.time()
         self.begun, self.stop = threading.Event(), threading.Event()
 
     def send(self, frames: Iterable[tuple[int, Frame]]) -> None:
-        """Send (counter, frame) until they end or `stop` is set; a late frame at once. Raises GesturedError."""
+        """Send each (counter, frame) until `stop` is set; a late frame is sent at once. Raises GesturedError."""
         for counter, frame in frames:
             wait = self.start + frame.t - time.monotonic()
             if self.stop.wait(max(wait, 0.0)):

@@ -1,4 +1,4 @@
-"""How a program is asked to end: SIGTERM, Ctrl-C, or a terminal that is closed (SIGHUP)."""
+"""The signals that ask a program to end: SIGTERM, Ctrl-C (SIGINT), or a terminal that is closed (SIGHUP)."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -9,8 +9,8 @@ ASKS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 def on_stop(act: Callable[[], object]) -> None:
-    """Act when somebody asks for the end."""
-    # `nohup` has SIGHUP ignored: its program needs no terminal.
+    """Call `act` when a signal asks the program to end."""
+    # Under `nohup` SIGHUP stays ignored, since the program is to outlive its terminal.
     asks = [number for number in ASKS if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN]
     for number in asks:
         signal.signal(number, lambda *_: act())
@@ -18,13 +18,13 @@ def on_stop(act: Callable[[], object]) -> None:
 
 
 def stop_as_by_ctrl_c() -> None:
-    """Let whatever asks for the end be a KeyboardInterrupt: what the program has started ends, too."""
+    """Turn each signal that asks for the end into a KeyboardInterrupt, so that a program can end its children."""
     on_stop(partial(signal.default_int_handler, signal.SIGINT, None))
 
 
 @contextmanager
 def stop_later() -> Iterator[None]:
-    """Let whoever asks for the end wait until something is whole; then it is a KeyboardInterrupt."""
+    """A context that is not interrupted: a signal that asks for the end becomes a KeyboardInterrupt after it."""
     before = {number: signal.getsignal(number) for number in ASKS}
     asked: list[bool] = []
     on_stop(lambda: asked.append(True))

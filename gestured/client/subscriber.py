@@ -21,8 +21,8 @@ from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, Unsubs
 from gestured.core.errors import GesturedError
 
 FIRST_S, LONGEST_S = 0.1, 2.0  # between attempts to connect, doubled each time; a restart takes a second
-CHUNK = 65536  # bytes read at a time
-LINE_BYTES = 4 << 20  # of a line, at most; a hello with all sensors that a daemon keeps has an eighth of that
+CHUNK = 65536  # the most bytes of one read
+LINE_BYTES = 4 << 20  # of a line, at most; a hello with all sensors that a daemon can keep has an eighth of these
 PROTOCOL = 1
 GREETING_S = 10.0  # to wait for the hello, which a daemon sends at once
 SILENT = f"says nothing within {GREETING_S:g} s: it hangs, or this is not its event socket (--socket)"
@@ -30,14 +30,14 @@ LOG = logging.getLogger("gestured")
 
 
 class Subscriber:
-    """An iterator over events, dicts as on the socket, and a context manager.
+    """An iterator over events, which are dicts as on the socket; also a context manager.
 
-    It connects when it is first iterated, and again by itself whenever a daemon goes and returns. A `lost` line is
-    given as an event, a `hello` is not: `hello` is that of the daemon whose event was given last, `path` its socket.
-    Its `instance` changes, and `sequence` counts anew, when the daemon has started again. A line in which a field is
-    missing or of another type than the protocol says is passed over, and `say` is told.
+    It connects when it is first iterated, and again whenever a daemon goes and returns. A `lost` line is given as an
+    event, a `hello` line is not: the attribute `hello` is that of the daemon whose event was given last, and `path` is
+    its socket. When a daemon has started again, `instance` in its `hello` is another, and `sequence` counts anew. A
+    line in which a field is missing, or has another type than the protocol says, is skipped and reported to `say`.
 
-    One thread iterates; any may `close` it, which ends the iteration.
+    One thread iterates; any thread may `close` it, which ends the iteration.
     """
 
     def __init__(  # noqa: PLR0913 - keywords, each a choice of its own
@@ -51,14 +51,14 @@ class Subscriber:
         reconnect: bool = True,
         say: Callable[[str], None] = LOG.warning,
     ) -> None:
-        """`paths` are event sockets; the filters are those of the protocol, None is its default.
+        """`paths` are event sockets; the filters are those of the protocol, and None is the protocol's default.
 
-        `say` is given a sentence about each line that is passed over.
+        `say` is called with a sentence about each line that is skipped.
 
-        Iterating raises TimeoutError after `timeout` seconds without an event, and may then go on. It raises Refused
-        where a daemon refuses the subscription or is none, Stranger where the socket is served by an account that is
-        not believed, Forbidden where it is not for us, and without `reconnect` Unreachable where no daemon is (any
-        more): all are GesturedError, and close it.
+        Iterating raises TimeoutError after `timeout` seconds without an event, and may then go on. All other errors are
+        GesturedErrors and close the subscriber: Refused if a daemon refuses the subscription or the peer is no daemon,
+        Stranger if an account that we do not trust serves the socket, Forbidden if we may not connect to it, and
+        without `reconnect` Unreachable if no daemon is there (any more).
         """
         if not paths:
             raise TypeError("Subscriber: expected the path of at least one event socket")
@@ -66,7 +66,7 @@ class Subscriber:
         self.path = Path(paths[0])
         self._sources = [_Source(Path(path)) for path in paths]
         wanted = {"types": types, "sensors": sensors, "gestures": gestures, "zones": zones}
-        # A text is passed on: what the daemon says of it is clearer than what it would say of its letters.
+        # A text is passed on as it is, since the daemon's error about a text is clearer than one about its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
         self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""
         self._timeout, self._reconnect, self._say = timeout, reconnect, say
@@ -87,26 +87,26 @@ class Subscriber:
         raise StopIteration
 
     def lines(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Each line as it came, and parsed; the `hello` of each connection among them."""
+        """Each line as it came, and parsed; also the `hello` of each connection."""
         while (line := self._next_line()) is not None:
             yield line
 
     @property
     def connected(self) -> bool:
-        """Whether every daemon is there: it has greeted, and has not hung up since."""
+        """Whether every daemon has sent its `hello` and has not hung up since."""
         return all(source.hello for source in self._sources)
 
     def close(self) -> None:
         """End the iteration and hang up; a second call does nothing. Any thread and any signal handler may call it.
 
-        In a forked child it leaves its parent's connections as they are.
+        In a forked child it leaves the parent's connections as they are.
         """
         self._closed = True
         if os.getpid() != self._pid:
             return
         with suppress(OSError):  # the subscriber is closed already
             self._wake.send(b".")
-        if self._iterating.acquire(blocking=False):  # else whoever iterates wakes now, and does it
+        if self._iterating.acquire(blocking=False):  # else the thread that iterates does this
             for source in self._sources:
                 if source.lines is not None:
                     source.lines.close()
@@ -123,7 +123,7 @@ class Subscriber:
         self.close()
 
     def _next_line(self) -> tuple[str, dict[str, Any]] | None:
-        """The next line; None when it is closed."""
+        """The next line; None once the subscriber is closed."""
         end = math.inf if self._timeout is None else time.monotonic() + self._timeout
         try:
             with self._iterating:
@@ -145,7 +145,7 @@ class Subscriber:
         return None
 
     def _wait(self, end: float) -> None:
-        """Wait until a line has come, a daemon is to be called, or it is `end` (monotonic seconds)."""
+        """Wait until a line has come, a connection is due, or it is `end` (monotonic seconds)."""
         now = time.monotonic()
         for source in self._sources:
             if source.due <= now and source.lines is None:
@@ -158,15 +158,15 @@ class Subscriber:
                 self._receive(key.data)
 
     def _call(self, source: "_Source", now: float) -> None:
-        self._pid = os.getpid()  # whose connections these are
+        self._pid = os.getpid()  # the process that the connections belong to
         try:
             source.lines = Lines(source.path, "--socket")
-        except Forbidden:  # to call it again changes nothing
+        except Forbidden:  # another attempt would change nothing
             raise
         except Unreachable as error:
             self._gone(source, error)
             return
-        with suppress(ConnectionError):  # the daemon hung up; its last lines are read all the same
+        with suppress(ConnectionError):  # the daemon hung up, but its last lines are still read
             source.lines.socket.sendall(self._request)
         source.lines.socket.setblocking(False)
         self._selector.register(source.lines.socket, selectors.EVENT_READ, source)
@@ -185,14 +185,14 @@ class Subscriber:
         for line in lines:
             self._unread.append((source, bytes(source.begun) + line))
             source.begun.clear()
-        source.begun += rest  # in place: what has come of a line is never copied for the next piece
+        source.begun += rest  # in place: no piece of a line is copied again
         if len(source.begun) > LINE_BYTES:
             raise Refused(
                 f"{source.path} sent a line of more than {LINE_BYTES >> 20} MiB: it is not served by gestured"
             )
 
     def _read(self, source: "_Source", line: bytes) -> tuple[str, dict[str, Any]] | None:
-        """What a line says; None where it is passed over, or says only that there is no place for us now."""
+        """A line, and parsed; None if it is skipped, or only says that the daemon has no place for us now."""
         message = parsed(line, source.path)
         text = line.decode()
         if message.get("type") == "error":
@@ -211,14 +211,14 @@ class Subscriber:
         return text, message
 
     def _gone(self, source: "_Source", error: Unreachable) -> None:
-        """There is no daemon (any more): call it again in a while. Without `reconnect` raises the error."""
+        """Drop the connection to a daemon that is gone, and try again later. Without `reconnect` raises the error."""
         if not self._reconnect:
             raise error
         if source.lines is not None:
             self._selector.unregister(source.lines.socket)
             source.lines.close()
         source.lines, source.hello = None, {}
-        self._unread = deque(line for line in self._unread if line[0] is not source)  # they are of no connection now
+        self._unread = deque(line for line in self._unread if line[0] is not source)  # of no connection now
         source.begun.clear()
         source.due = time.monotonic() + source.wait_s
         source.wait_s = min(2.0 * source.wait_s, LONGEST_S)

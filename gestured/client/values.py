@@ -1,4 +1,4 @@
-"""Values on a command line, as argparse's `type` takes them: read, or refused in one sentence."""
+"""The values on a command line, for argparse's `type`: each is read, or refused in one sentence."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ def host_port(text: str) -> Address:
         if address.port:
             return address
     except ValueError:
-        pass  # said below, with an example
+        pass  # the error below has an example
     raise ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")
 
 
@@ -44,7 +44,7 @@ def sensor_name(text: str) -> str:
 
 def npz(text: str) -> Path:
     """A file of recordings to write; `gestured-lab forget` finds it by its ending."""
-    if (path := Path(text)).suffix != ".npz":  # so no tape is replaced by its frames, either
+    if (path := Path(text)).suffix != ".npz":  # this also keeps tapes from being overwritten
         raise ArgumentTypeError(f"{text!r}: expected a file *.npz")
     return path
 

@@ -1,1 +1,1 @@
-"""A page whose pad is a sensor: what touches it in a browser becomes the frames of a simulated textile, sent as OSC."""
+"""The pad: a page on which touches in a browser become the frames of a simulated textile, which are sent as OSC."""

@@ -1,4 +1,4 @@
-"""What touches the pad: samples that a browser sends, as contacts on our own clock."""
+"""The contacts of a pad, made from the samples that a browser sends, on our own clock."""
 
 import math
 from collections import deque
@@ -13,12 +13,12 @@ from gestured.simulator.people import Press
 from gestured.simulator.sampling import FINGER_MM
 
 MOST = 10  # contacts at a time
-KEPT_S = 1.0  # how far back samples may lie, and are kept
+KEPT_S = 1.0  # how old samples may be, and how long they are kept
 SAMPLES = 1000  # of a contact that are kept at most
-ENDED = 4 * MOST  # contacts that have ended within that time and are kept at most
-APART_S = 1e-4  # between two samples of a contact
-SILENT_S = 2.0  # a browser says ten times a second what still touches; after so long without a word nothing does
-FORCE = (0.3, 2.0)  # of a contact, where the browser tells its pressure: half of it is a normal finger's
+ENDED = 4 * MOST  # the most contacts that have ended within KEPT_S and are kept
+APART_S = 1e-4  # between two samples of a contact, at least
+SILENT_S = 2.0  # a browser sends what still touches ten times a second; after so long without a message, nothing does
+FORCE = (0.3, 2.0)  # the least and the most of a contact; a browser's pressure of 0.5 is the force 1 of a normal finger
 WIDE = 3.0  # a contact is as wide as so many standard deviations of its footprint
 FOOTPRINT_MM = (2.2, 7.0)  # standard deviations of a footprint: the thinnest and the widest finger's
 
@@ -34,14 +34,14 @@ class _Contact:
 
 
 class Contacts:
-    """The contacts of one pad. Times are seconds on the clock of `now`, which any clock may be that never goes back."""
+    """The contacts of one pad. Times are seconds on the clock of `now`, which may be any clock that never goes back."""
 
     def __init__(self, sensor: SimulatedSensor) -> None:
         self._sensor = sensor
         self._contacts: dict[int, _Contact] = {}  # by the browser's number
         self._ended: list[_Contact] = []
         self._number = 0
-        self._behind = math.inf  # s, from the browser's clock to ours, with the shortest way of a message so far
+        self._behind = math.inf  # s, from the browser's clock to ours, by the fastest message so far
         self._heard = -math.inf
 
     @property
@@ -50,7 +50,7 @@ class Contacts:
         return bool(self._contacts)
 
     def take(self, sent: float, samples: Iterable[object], now: float) -> None:
-        """Samples that a browser sent at `sent` s of its clock; ValueError for what is none.
+        """Take samples that a browser sent at `sent` s of its clock. Raises ValueError for what is no sample.
 
         Each is its contact's number, s of the browser's clock, x and y (0..1 from the bottom-left corner), pressure
         (0: it has left) and width (shares of the pad's width; 0 is not known).
@@ -59,7 +59,7 @@ class Contacts:
         if not math.isfinite(sent):
             raise ValueError(f"sent: expected seconds, found {sent}")
         if not self._contacts and now - sent - self._behind > KEPT_S / 2:
-            self._behind = math.inf  # one of the clocks stood still, as in a machine that slept
+            self._behind = math.inf  # a clock stood still, as in a machine that slept
         self._behind = min(self._behind, now - sent)
         self._heard = now
         for name, t, *what in read:
@@ -73,7 +73,7 @@ class Contacts:
         self._contacts.clear()
 
     def presses(self, t: float, now: float) -> tuple[list[Press], tuple[Touch, ...]]:
-        """The contacts of the frame that ends at `t` s, and where their fingers are then. Call it in order."""
+        """The contacts of the frame that ends at `t` s, and its fingers. Call it with times that increase."""
         if now - self._heard > SILENT_S:
             self.lift()
         dt, pitch = 1.0 / self._sensor.rate_hz, self._sensor.pitch_mm

@@ -1,4 +1,4 @@
-"""What a person is told before a pad is opened, and its address as a QR code."""
+"""The invitation to a pad: what its address opens, and that address as a QR code."""
 
 import io
 import sys
@@ -14,7 +14,7 @@ who hears the network can hear the token and the touches, and take the pad over.
 
 
 def invite(server: PadServer) -> None:
-    """Say on standard error what the address opens; at a terminal a telephone can take it from there, as a QR code."""
+    """Say on standard error what the address opens, and print it as a QR code if that is a terminal."""
     if is_loopback(server.address.host):
         say("Open this address in a browser on this machine; it works once.", to=sys.stderr)
         return

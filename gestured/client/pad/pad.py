@@ -1,4 +1,4 @@
-"""A pad as a sensor: its contacts become frames at the sensor's rate, which are sent to a daemon as OSC."""
+"""A pad as a sensor: its contacts become frames at the sensor's rate, sent to a daemon as OSC."""
 
 import threading
 import time
@@ -17,15 +17,15 @@ from gestured.core.frames import Frame
 from gestured.simulator import SimulatedSensor
 from gestured.simulator.live import LiveTextile
 
-LATE_S = 0.06  # a frame shows what touched the pad so long ago: by then the browser has told it
-AGAIN_S = 1.0  # after a packet could not be sent
-SEEN = 0.1  # how much of what the untouched sensor shows is learned from each frame
+LATE_S = 0.06  # a frame shows the contacts of so long ago, of which the browser has sent the samples by now
+AGAIN_S = 1.0  # s until the next attempt after a packet could not be sent
+SEEN = 0.1  # the weight of each untouched frame in what is learned of the idle sensor
 
-Tell = Callable[[str, dict[str, Any]], None]  # an event to the page: its kind, and what
+Tell = Callable[[str, dict[str, Any]], None]  # sends an event to the page: its kind and content
 
 
 class Pad:
-    """A simulated sensor that is touched in a browser. Raises GesturedError where nothing can be sent to `to`."""
+    """A simulated sensor that is touched in a browser. Raises GesturedError if nothing can be sent to `to`."""
 
     def __init__(self, to: Address, name: str, grid: tuple[int, int], rate_hz: float) -> None:
         nominal = SimulatedSensor.nominal()
@@ -39,9 +39,9 @@ class Pad:
         self._sender = Sensor(to, Form(name))
 
     def begin(self, tell: Tell, events: Subscriber | None = None) -> None:
-        """Send frames from now on; the page is told them, and events, as they come.
+        """Send frames from now on; `tell` gets each frame and each event for the page.
 
-        `events` has the status among its types, and a timeout that is longer than the second between two of them.
+        `events` asks for the status, too, and has a timeout longer than the second between two statuses.
         """
         self._tell = tell
         threading.Thread(target=self._send, daemon=True).start()
@@ -85,7 +85,7 @@ class Pad:
                     self._tell("event", event)
 
     def _frames(self) -> Iterator[tuple[int, Frame]]:
-        """Each frame at its time; those for which the machine had no time are left out, and their counts are lost."""
+        """Each frame at its time, with its counter; frames for which the machine was too slow are left out."""
         dt, start, stop = 1.0 / self.rate_hz, self._sender.start, self._sender.stop
         counter, unheard, idle = 0, 0, None
         while not stop.is_set():

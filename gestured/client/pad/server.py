@@ -1,4 +1,4 @@
-"""The page of a pad: who may touch it, and how much."""
+"""The server of a pad's page: it decides who may touch the pad, and how much."""
 
 import threading
 import time
@@ -18,37 +18,37 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
 PAGE = Path(__file__).with_name("page")
-MESSAGES = 120  # a second
-IDLE_S = 600.0  # without a touch; then the address has ended
-SAID = 1000  # characters
+MESSAGES = 120  # of the browser in a second, at most
+IDLE_S = 600.0  # without a touch, after which the address is no longer valid
+SAID = 1000  # characters of `say` that are kept for a browser that comes later
 DEFAULT = Address("127.0.0.1", 9110)
-HEARD = ("onset", "provisional", "gesture", "unknown", "cancelled", "status")  # the status says that it lives
-SILENT_S = 4.0  # without a word; a daemon tells its status each second
+HEARD = ("onset", "provisional", "gesture", "unknown", "cancelled", "status")  # the status is a sign of life
+SILENT_S = 4.0  # without an event, though a daemon sends its status each second
 
 
 class PadServer(Server):
-    """Serves one browser, on the one address that it is given; a context manager, served as long as that lasts.
+    """Serves one browser on one address; a context manager, whose end closes everything.
 
-    `ended` is set once the pad has not been touched for `idle_s`. Raises GesturedError where the address cannot be had.
+    `ended` is set once the pad has not been touched for `idle_s`. Raises GesturedError if the address cannot be had.
     """
 
     def __init__(self, listen: Address, pad: Pad, program: str, idle_s: float = IDLE_S) -> None:
-        """`program` printed the page's address, and would print another one."""
+        """`program` is the command that prints the page's address, and prints another one if it is started again."""
         super().__init__(listen, Door(program), PAGE, _Handler)
         if (host := ip_address(self.address.host)).is_unspecified or host.is_multicast:
             self.server_close()
             raise GesturedError(f"--listen {listen}: expected one address of this machine, such as {DEFAULT}")
         self.pad = pad
         self.ended = threading.Event()
-        self.press: Callable[[str], None] | None = None  # takes a key of the page, where somebody waits for one
-        self._said = ""  # what somebody who waits for keys has said last
+        self.press: Callable[[str], None] | None = None  # takes a key of the page, if keys are wanted
+        self._said = ""  # the last words of `say`
         self._idle_s, self._used = idle_s, time.monotonic()
-        self._messages: deque[float] = deque(maxlen=MESSAGES)  # when the last ones came
+        self._messages: deque[float] = deque(maxlen=MESSAGES)  # s, when the last ones came
         self._outbox: Outbox | None = None  # of the browser that has the pad
-        self._seat = 0  # counts the browsers that had it
+        self._seat = 0  # number of the browser that has it
 
     def serve(self, *sockets: Path) -> Self:
-        """Serve from now on, in threads; the page is told the sensor's events by the daemon with this event socket."""
+        """Serve from now on, in threads; the page shows the sensor's events of the daemons with these event sockets."""
         events = Subscriber(*sockets, types=HEARD, sensors=[self.pad.name], timeout=SILENT_S) if sockets else None
         self.pad.begin(self.tell, events)
         threading.Thread(target=self.serve_forever, daemon=True).start()
@@ -60,7 +60,7 @@ class PadServer(Server):
         return self._outbox is not None
 
     def tell(self, kind: str, what: dict[str, Any]) -> None:
-        """Tell the page something; without a page nobody is told."""
+        """Send something to the page; without a page it is dropped."""
         if (outbox := self._outbox) is None:
             return
         if kind == "frame":
@@ -69,12 +69,12 @@ class PadServer(Server):
             outbox.put(kind, what)
 
     def say(self, text: str) -> None:
-        """Show words on the page; whoever opens it later sees the last ones."""
+        """Show words on the page; a browser that opens it later sees the last ones."""
         self._said = (self._said + text)[-SAID:]
         self.tell("told", {"text": text})
 
     def service_actions(self) -> None:
-        """End the address after its time, too."""
+        """Do the base class's work, and end the address after `idle_s`."""
         super().service_actions()
         if time.monotonic() - self._used > self._idle_s and not self.ended.is_set():
             self.door.closed = True
@@ -83,7 +83,7 @@ class PadServer(Server):
             self.ended.set()
 
     def sit(self) -> Outbox:
-        """A browser shows the pad, in place of the one before."""
+        """Give the pad to a browser, in place of the one before; returns what waits for it."""
         pad, before = self.pad, self._outbox
         outbox = Outbox()
         with pad.lock:
@@ -99,7 +99,7 @@ class PadServer(Server):
         return outbox
 
     def leave(self, outbox: Outbox | None) -> None:
-        """A browser shows it no more: what touched it there is lifted."""
+        """Note that a browser no longer shows the pad: its contacts end."""
         with self.pad.lock:
             if outbox is not None and outbox is self._outbox:
                 self._outbox = None

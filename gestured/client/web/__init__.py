@@ -1,1 +1,1 @@
-"""What the pages that gestured serves share: who may come in, what waits for a browser, and how it is served."""
+"""The shared parts of the pages that gestured serves: who may come in, what waits for a browser, and the server."""

@@ -1,7 +1,7 @@
-"""Who may look, and who may change anything: a token in the address that works once, then a secret in a header.
+"""The door of a page: a token in the address that works once, then a secret in a header of each request.
 
-There is no cookie: browsers send one to every port of a host, and a neighbour's page on another port of this machine
-would be sent it. A page keeps the secret for its own origin and tab, and no other page can read it, or send the header.
+There is no cookie, since browsers send cookies to every port of a host, also to a page of another user on this machine.
+A page keeps the secret for its own origin and tab; no other page can read the secret, or send the header.
 """
 
 import hmac
@@ -19,13 +19,13 @@ class Door:
 
     def __init__(self, program: str) -> None:
         self.program = program
-        self.token = secrets.token_urlsafe(24)  # in the address; whoever opens it first comes in
+        self.token = secrets.token_urlsafe(24)  # in the address; the first browser that brings it comes in
         self._secret = secrets.token_urlsafe(24)  # of the tab that came in
         self._used = False
-        self.closed = False  # from then on nobody is known
+        self.closed = False  # if so, nobody comes in or is known
 
     def open(self, headers: Message) -> str | None:
-        """The secret for who brings the token, or the secret itself; None for anybody else. The token opens once."""
+        """The secret, for a request with the unused token or with the secret itself; None for any other."""
         if self.knows(headers):
             return self._secret
         if self.closed or self._used or not _same(headers.get(HEADER, ""), self.token):
@@ -39,13 +39,13 @@ class Door:
 
 
 def at_home(headers: Message, address: Address) -> bool:
-    """Whether a request was meant for the page at this address, and comes from it or from nobody's.
+    """Whether a request was meant for the page at this address, and comes from this page or from no page.
 
-    Another site's page can make a browser ask us, under a name of its own that leads to this machine, too.
+    A page of another site can make a browser send us requests, even under a host name that leads to this machine.
     """
     loopback = {"127.0.0.1", "::1", "localhost"} if is_loopback(address.host) else set()
     homes = [str(Address(host, address.port)) for host in {address.host, *loopback}]
-    if address.port == 80:  # which browsers leave out
+    if address.port == 80:  # browsers leave it out
         homes += [home.removesuffix(":80") for home in homes]
     origin = headers.get("Origin")
     from_here = headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")

@@ -1,4 +1,4 @@
-"""What waits for one browser: of frames the newest alone, of the rest the latest few."""
+"""The outbox of one browser: only the newest frame waits, and the latest few of all other events."""
 
 import json
 import threading
@@ -9,7 +9,7 @@ MOST = 200  # events that wait; a browser that was stalled shows no more
 
 
 class Outbox:
-    """Filled by those who hear the daemon, emptied by the thread that serves the browser; nobody waits to fill it."""
+    """The events that wait for one browser. Whoever puts one never waits; the thread of the browser takes all."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -18,25 +18,25 @@ class Outbox:
         self._closed = False
 
     def frame(self, frame: dict[str, Any]) -> None:
-        """A frame takes the place of the one that waits."""
+        """Put a frame in the place of the one that waits."""
         with self._changed:
             self._frame = frame
             self._changed.notify()
 
     def put(self, kind: str, what: dict[str, Any]) -> None:
-        """Something that must not be passed over, unless far too much of it waits."""
+        """Put an event that must not be left out, unless more than MOST wait."""
         with self._changed:
             self._rest.append((kind, what))
             self._changed.notify()
 
     def close(self) -> None:
-        """Nothing more will come after what waits."""
+        """Take no more; what waits is still given."""
         with self._changed:
             self._closed = True
             self._changed.notify()
 
     def take(self, patience_s: float) -> bytes | None:
-        """All that waits, as server-sent events; a comment where nothing came for so long, None at the end."""
+        """All that waits, as server-sent events; a comment if nothing came for `patience_s`, None after `close`."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._frame or self._rest, patience_s)
             found = [*self._rest, *([("frame", self._frame)] if self._frame is not None else [])]

@@ -1,4 +1,4 @@
-"""A page over HTTP, and server-sent events; a thread for each connection, so that no browser waits for another."""
+"""The server of a page over HTTP, with server-sent events; each connection has a thread, so no browser waits."""
 
 import json
 import socket
@@ -31,10 +31,10 @@ SAFE = {
 }
 STRANGERS = 32  # connections at a time that have not shown the secret; a further one takes the oldest one's place
 BODY_BYTES = 4096  # of a request
-ASK_S = 10.0  # for all of a request to come, and for its answer to go
-SEND_S = 60.0  # for a browser that is stalled; then it has to come again, which it does by itself
-ALIVE_S = 5.0  # without anything new, a comment says that the server is there
-SENT_BYTES = 32 << 10  # that may be on their way to a browser: a stalled one comes back to the present, not to the past
+ASK_S = 10.0  # s for a request to come, and for its answer to go
+SEND_S = 60.0  # s for a browser that is stalled; after them it has to connect again, which it does by itself
+ALIVE_S = 5.0  # s without an event, after which a comment shows that the server is alive
+SENT_BYTES = 32 << 10  # that may be on their way to a browser; few, so that one that was stalled sees the present soon
 
 Said = tuple[HTTPStatus, Mapping[str, Any]]  # an answer, as a JSON object
 
@@ -42,19 +42,19 @@ Said = tuple[HTTPStatus, Mapping[str, Any]]  # an answer, as a JSON object
 class Server(ThreadingHTTPServer):
     """Serves the files of `page`, and those that all pages share; a context manager.
 
-    Raises GesturedError where the address cannot be had.
+    Raises GesturedError if the address cannot be had.
     """
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = 128  # beyond that the kernel has a browser try again, after a second, then three, then seven
+    request_queue_size = 128  # beyond them a browser's kernel tries again after one second, then after three and seven
 
     def __init__(self, listen: Address, door: Door, page: Path, handler: "type[Handler]") -> None:
         self.door = door
         self.files = {f"/{path.name}": path for folder in (SHARED, page) for path in folder.iterdir()}
         self.files["/"] = self.files.pop("/index.html")
         self.address_family = socket.AF_INET6 if ":" in listen.host else socket.AF_INET
-        self._strangers: dict[socket.socket, float] = {}  # since when they are there (monotonic s), the oldest first
+        self._strangers: dict[socket.socket, float] = {}  # by connection: its begin (monotonic s), the oldest first
         try:
             super().__init__((listen.host, listen.port), handler)
         except OSError as error:
@@ -68,7 +68,7 @@ class Server(ThreadingHTTPServer):
         return f"http://{self.address}/#{self.door.token}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """A new connection: who takes all places gives the oldest one's to others."""
+        """Serve a new connection, which takes the place of the oldest stranger if there are too many."""
         for oldest in list(self._strangers)[: 1 - STRANGERS]:
             self.no_stranger(oldest)
             _hang_up(oldest)
@@ -76,30 +76,30 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def service_actions(self) -> None:
-        """Hang up on strangers who take their time; called twice a second."""
+        """Hang up on strangers that are too slow; http.server calls this twice a second."""
         for request, since in list(self._strangers.items()):
             if time.monotonic() - since > ASK_S:
                 _hang_up(request)
 
     def shutdown_request(self, request: Any) -> None:
-        """The end of a connection."""
+        """End a connection."""
         self.no_stranger(request)
         super().shutdown_request(request)
 
     def no_stranger(self, request: socket.socket) -> None:
-        """Who has shown the secret may stay."""
+        """Note that a connection is no stranger any more: it has shown the secret, or is over."""
         self._strangers.pop(request, None)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that has gone is none of our business."""
+        """Do nothing, since the usual error is that a browser has gone."""
 
 
 class Handler(BaseHTTPRequestHandler):
-    """A request of a browser, and its answer. What a page shows and does is in `look` and `act`."""
+    """One request of a browser, and its answer. Subclasses define what a page shows (`look`) and does (`act`)."""
 
     server: Server
     timeout = ASK_S
-    disable_nagle_algorithm = True  # an answer is two writes, and the second would wait for the first one's receipt
+    disable_nagle_algorithm = True  # else the second write of an answer waits for the receipt of the first one
     server_version, sys_version = "gestured", ""
 
     def look(self, query: Mapping[str, str]) -> None:
@@ -111,7 +111,7 @@ class Handler(BaseHTTPRequestHandler):
         raise NotImplementedError
 
     def do_GET(self) -> None:  # noqa: N802  # http.server's name
-        """The page, its parts, and the stream."""
+        """Answer with the page, one of its parts, or the stream."""
         try:
             where = urlsplit(self.path)
         except ValueError:
@@ -119,7 +119,7 @@ class Handler(BaseHTTPRequestHandler):
             return
         if not at_home(self.headers, self.server.address):
             self.refuse(HTTPStatus.FORBIDDEN, "another host, or another site's page")
-        elif (file := self.server.files.get(where.path)) is not None:  # nothing in them is anybody's
+        elif (file := self.server.files.get(where.path)) is not None:  # no file holds private data
             self._answer(HTTPStatus.OK, f"{KINDS[file.suffix]}; charset=utf-8", file.read_bytes())
         elif where.path != "/stream":
             self.refuse(HTTPStatus.NOT_FOUND, "no such page")
@@ -129,7 +129,7 @@ class Handler(BaseHTTPRequestHandler):
             self.look({key: values[0] for key, values in parse_qs(where.query).items()})
 
     def do_POST(self) -> None:  # noqa: N802
-        """Come in, or act: what needs the token, and what changes anything."""
+        """Come in with the token, or act with the secret."""
         door = self.server.door
         try:
             length = int(self.headers.get("Content-Length", ""))
@@ -137,7 +137,7 @@ class Handler(BaseHTTPRequestHandler):
             what = json_object(self.rfile.read(length)) if fits else None
         except (ValueError, OSError):
             fits, what = False, None
-        self.close_connection |= not fits  # what has not been read is no further request
+        self.close_connection |= not fits  # the rest of the body must not be read as a request
         if not at_home(self.headers, self.server.address):
             said: Said = HTTPStatus.FORBIDDEN, {"error": "another host, or another site's page"}
         elif self.path == "/open" and (secret := door.open(self.headers)) is not None:
@@ -151,19 +151,19 @@ class Handler(BaseHTTPRequestHandler):
         self._answer(said[0], "application/json", json.dumps(said[1]).encode())
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is logged: who looks is not our business, and an address holds the token."""
+        """Log nothing, since who looks at a page is nobody's business."""
 
     def refuse(self, status: HTTPStatus, words: str) -> None:
         """Answer with a sentence."""
         self._answer(status, "text/plain", f"{words}\n".encode())
 
     def stream(self, outbox: Outbox) -> None:
-        """Send what comes into an outbox, until it is closed or the browser has gone."""
+        """Send what comes into an outbox, until the outbox is closed or the browser has gone."""
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SENT_BYTES)
         self.connection.settimeout(SEND_S)
         self.close_connection = True
         self._head(HTTPStatus.OK, {"Content-Type": "text/event-stream", "Connection": "close"})
-        with suppress(OSError):  # it has gone
+        with suppress(OSError):  # the browser has gone
             while (what := outbox.take(ALIVE_S)) is not None:
                 self.wfile.write(what)
 
