@@ -1,1 +1,1 @@
-"""Recordings and tapes: read, written, held against the contract, and played."""
+"""Recordings and tapes: read, written, checked against the contract, and played."""

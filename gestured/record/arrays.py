@@ -1,8 +1,8 @@
-"""Read and write recordings: the contract's .npz, without pickles, readable with NumPy alone.
+"""The files of recordings: the contract's .npz, without pickles, readable with NumPy alone.
 
-A file may be damaged or hostile: what it unpacks to is bounded before any of it is, NumPy holds each member against its
-header, and every field is held against the contract (`check`). What is wrong is one `RecordingError`: file, field,
-recording, and what was expected.
+A file may be damaged or hostile. So its unpacked size is bounded before anything is unpacked, NumPy checks each member
+against its header, and every field is checked against the contract (`check`). A fault is a `RecordingError` with the
+file, the field, the recording, and what was expected.
 """
 
 import zipfile
@@ -24,7 +24,7 @@ _REQUIRED = _FIELDS[:5]
 
 
 def read(path: str | Path) -> Recordings:
-    """Read and check a file; RecordingError for what is no recording. It ignores unknown members."""
+    """Read and check a file; unknown members are ignored. Raises RecordingError for a file that is no recording."""
     try:
         found = _load(path)
         check(found)
@@ -34,7 +34,7 @@ def read(path: str | Path) -> Recordings:
 
 
 def write(path: str | Path, recordings: Recordings) -> None:
-    """Check and write: all or nothing, the same bytes for the same recordings. Raises RecordingError."""
+    """Check recordings and write them, all or nothing; equal ones give equal bytes. Raises RecordingError."""
     path = Path(path)
     try:
         check(recordings)
@@ -50,7 +50,7 @@ def write(path: str | Path, recordings: Recordings) -> None:
 
 
 def _load(path: str | Path) -> Recordings:
-    """A file's fields as they are; raises Wrong."""
+    """A file's fields before the check; raises Wrong."""
     try:
         with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             held = {member.filename.removesuffix(".npy") for member in archive.infolist()}
@@ -67,7 +67,7 @@ def _load(path: str | Path) -> Recordings:
 
 
 def _array(archive: zipfile.ZipFile, field: str) -> NDArray[Any]:
-    """A field's values, in this machine's byte order; in memory they are only once."""
+    """A field's values in this machine's byte order, swapped in place since they may be large."""
     try:
         with archive.open(f"{field}.npy") as member:
             array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
@@ -77,7 +77,7 @@ def _array(archive: zipfile.ZipFile, field: str) -> NDArray[Any]:
 
 
 def _brief(error: BaseException) -> str:
-    """What an exception of somebody else's says, in one short line."""
+    """The text of a foreign exception, in one short line."""
     return getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or type(error).__name__
 
 

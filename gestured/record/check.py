@@ -1,4 +1,4 @@
-"""What the contract says of a recording's fields, held against them."""
+"""The check of a recording's fields against the contract."""
 
 import re
 from collections.abc import Iterator
@@ -12,11 +12,11 @@ from gestured.model.metadata import GESTURE_NAME
 from gestured.record.recordings import EVENT, FINGERS, Recordings
 
 SESSION = "session"  # the label of a recording that holds many gestures, and marks for each
-UNNAMED = "other"  # the label of what was performed without anybody knowing which gesture it is
-MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
-RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
+UNNAMED = "other"  # the label of a performance of which nobody knows the gesture
+MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; to check their times takes a multiple of their memory
+RECORDINGS = 1 << 20  # of a file, and as many events; bounded since each of their texts is checked alone
 CHARACTERS = 1024  # of one text
-LATEST_S = 1e11  # s, the latest time of a frame: the year 5138, and less than today in milliseconds since 1970
+LATEST_S = 1e11  # s, the latest time of a frame: the year 5138; times in ms since 1970 are larger, and so refused
 LARGEST = float(np.finfo(np.float32).max)  # counts, as a sensor can send them
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field holds, and its shape: N frames of R x C taxels, G recordings, E performed events.
@@ -42,11 +42,11 @@ FORMS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "sensors": (TEXT, ("G",)),
     "consents": (TEXT, ("G",)),
 }
-DTYPE_KINDS = {INTEGERS: "iu", COUNTS: "iuf", ANY: "iufU", TEXT: "U"}  # NumPy's; any other form is the very type
+DTYPE_KINDS = {INTEGERS: "iu", COUNTS: "iuf", ANY: "iufU", TEXT: "U"}  # NumPy's, by form; any other form is a dtype
 EVENT_FIELDS = tuple(field for field in FORMS if field.startswith(EVENT))
 MOST = {"frames": MAX_FRAMES, "offsets": RECORDINGS + 1, "event_recording": RECORDINGS}
 
-Right = tuple[str, NDArray[Any], str, NDArray[np.int64] | None]  # field; what is right; what is; whose frames those are
+Right = tuple[str, NDArray[Any], str, NDArray[np.int64] | None]  # field, which are right, expected, whose they are
 
 
 class Wrong(Exception):
@@ -54,13 +54,13 @@ class Wrong(Exception):
 
 
 def check(r: Recordings) -> None:
-    """Everything the contract says of the fields; raises Wrong."""
+    """Check the fields against all rules of the contract; raises Wrong."""
     _shapes(r)
     n, first, last = len(r.frames), r.offsets[0], r.offsets[-1]
     if (first, last) != (0, n):
         raise Wrong(f"offsets: expected from 0 to {n}, the number of frames, found {first} to {last}")
     for field, value in r.present():
-        if value.dtype.kind == "U" and value.size:  # Python would make broken strings of numbers that are no characters
+        if value.dtype.kind == "U" and value.size:  # numbers that are no characters would make broken strings
             codes = np.ascontiguousarray(value).view(np.uint32)
             if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
                 raise Wrong(f"{field}: holds what is no text")
@@ -73,7 +73,7 @@ def check(r: Recordings) -> None:
 
 
 def _shapes(r: Recordings) -> None:
-    """Types, shapes and numbers: what must hold for the fields to be told apart. Raises Wrong."""
+    """Check types, shapes and sizes, on which all other rules rely; raises Wrong."""
     if r.frames.ndim != 3 or not all(SIDES[0] <= side <= SIDES[1] for side in r.frames.shape[1:]):
         sides = f"R and C from {SIDES[0]} to {SIDES[1]}"
         raise Wrong(f"frames: expected the shape (N, R, C), {sides}, found {r.frames.shape}")
@@ -110,7 +110,7 @@ def _offsets(r: Recordings) -> Iterator[Right]:
 
 def _frames(r: Recordings) -> Iterator[Right]:
     if r.frames.dtype.kind == "f" and r.frames.size:
-        low, high = (ends(r.frames, axis=(1, 2)).astype(np.float64) for ends in (np.min, np.max))  # NaN is both
+        low, high = (ends(r.frames, axis=(1, 2)).astype(np.float64) for ends in (np.min, np.max))  # NaN if any is
         yield "frames", np.isfinite(low) & np.isfinite(high), "finite values", _owner(r)
         yield "frames", (low >= -LARGEST) & (high <= LARGEST), "values that a float32 holds", _owner(r)
 

@@ -1,4 +1,4 @@
-"""Files: written at once or not at all, and opened without trusting what stands at a path."""
+"""Files: written whole or not at all, and opened without trust in what is at a path."""
 
 import errno
 import glob
@@ -14,13 +14,13 @@ PRIVATE = 0o600  # whatever is about people: how somebody touches things is pers
 PUBLIC = 0o644  # what anybody may read, as far as the umask lets them: models, figures, caches of simulated people
 
 NOT_REGULAR = "is not a regular file"
-NAME_BYTES = 8  # chance in the name of a file that is not complete yet
+NAME_BYTES = 8  # random bytes in the name of a file that is not complete yet
 
 
 def create(path: Path, mode: int = PRIVATE) -> BinaryIO:
-    """A new file to write to, which has `mode` (less the umask) from the start. OSError where anything is there.
+    """A new file to write to, with `mode` (less the umask) from the start. Raises OSError if anything is at `path`.
 
-    No link is followed, so nobody can lead what is written elsewhere.
+    No link is followed, so that nobody can redirect what is written.
     """
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     return open(os.open(path, flags, mode), "wb")
@@ -28,11 +28,11 @@ def create(path: Path, mode: int = PRIVATE) -> BinaryIO:
 
 @contextmanager
 def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> Iterator[BinaryIO]:
-    """A file to write to that takes the place of `path` in the end, all of it; whatever is raised changes nothing.
+    """A file to write to, which replaces `path` once it is complete; if anything is raised, `path` stays as it was.
 
-    It is written beside `path` under a name that nobody can foresee. What is `durable` survives a power cut once
-    this returns; what can be made again, as a cache, need not. Raises OSError, also where a device or a pipe stands
-    there, which would be gone: as root, /dev/null for everybody.
+    It is written beside `path` under a name that nobody can foresee. If it is `durable`, it survives a power cut once
+    this returns; a file that can be made again, such as a cache, need not be. Raises OSError, also if `path` is a
+    device or a pipe, which would be replaced: by root even /dev/null.
     """
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, NOT_REGULAR, str(path))
@@ -54,14 +54,14 @@ def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> It
 
 
 def delete_leftovers(path: Path) -> None:
-    """Delete what writers of `path` that were killed have left beside it; nobody may be writing it now."""
+    """Delete incomplete files that killed writers of `path` have left beside it; nobody may be writing it now."""
     with suppress(OSError):
         for left in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * (2 * NAME_BYTES)}"):
             left.unlink()
 
 
 def _sync_folder(folder: Path) -> None:
-    """Put a changed name onto the disk; some file systems cannot do that for a folder."""
+    """Put the changed names in a folder onto the disk, if its file system can do that."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
@@ -71,7 +71,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def open_regular(path: str | Path) -> BinaryIO:
-    """A regular file to read from; OSError for anything else. Nobody waits for a pipe's other end."""
+    """A regular file to read from. Raises OSError for anything else, without waiting for a pipe's other end."""
     try:
         file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY))
     except ValueError as error:  # a path with a NUL

@@ -1,9 +1,9 @@
-"""Who performed what, and who said what: one rule, one tolerance, and the words for how it went.
+"""The judge: gestures that were performed, compared with the events about them, by one rule and one tolerance.
 
-What was said belongs to the performance that it overlaps most in time, if it lies within TOLERANCE_S of it. The first
-gesture that is said of a performance decides: `right` or `wrong`. Another one of the same performance, one of no
-performance, and one of what is no gesture are `false`. A gesture of which none was said is `missed`, also called lost.
-Times are seconds on any clock that both sides share.
+An event belongs to the performance that it overlaps most in time, if it lies within TOLERANCE_S of that. The first
+gesture event of a performance is `right` or `wrong`. A further one, one without a performance, and one of a performance
+that is no gesture are `false`. A performed gesture without a gesture event is `missed`, also called lost. Times are
+seconds on any clock that performances and events share.
 """
 
 import math
@@ -13,34 +13,34 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any, Protocol, TypeVar
 
-LEAST = 20  # gestures, of which percentiles say something
+LEAST = 20  # gestures, from which on percentiles are given
 NONE = "none"  # the label of whatever is no gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
-REACH_S = 2 * TOLERANCE_S  # what lies farther away belongs to something else, however the times were rounded
-MISSED_AFTER_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
+REACH_S = 2 * TOLERANCE_S  # an event farther away cannot belong to a performance, however the times were rounded
+MISSED_AFTER_S = 1.5  # after the end of a performance; longer than any wait for a second tap
 
 
 class Act(Protocol):
-    """Something that was performed, as any room writes it down."""
+    """A performance, in any class that has these attributes."""
 
     @property
     def label(self) -> str:
-        """A gesture, or NONE."""
+        """The gesture, or NONE."""
 
     @property
     def onset(self) -> float:
-        """When it began, in s."""
+        """When the performance began, in s."""
 
     @property
     def offset(self) -> float:
-        """When it ended, in s."""
+        """When the performance ended, in s."""
 
 
 A = TypeVar("A", bound=Act)
 
 
 def whose(onset: float, offset: float, performed: Iterable[A]) -> A | None:
-    """The performance to which what was said of `onset` to `offset` (s) belongs; None for none."""
+    """The performance to which an event from `onset` to `offset` (s) belongs; None if there is none."""
 
     def overlap(act: A) -> float:
         return min(offset, act.offset) - max(onset, act.onset)
@@ -50,7 +50,7 @@ def whose(onset: float, offset: float, performed: Iterable[A]) -> A | None:
 
 
 def owners(spans: Sequence[tuple[float, float]], performed: Iterable[A]) -> list[A | None]:
-    """Whose each (onset, offset) in s is, as `whose` has it, where there are too many to look at all."""
+    """The performance of each event (onset, offset) in s, as `whose` finds it, but faster for many."""
     ahead = deque(sorted(enumerate(performed), key=lambda one: one[1].onset))
     near: dict[int, A] = {}  # by place in `performed`, whose order decides between two that overlap as much
     found: list[A | None] = [None] * len(spans)
@@ -65,7 +65,7 @@ def owners(spans: Sequence[tuple[float, float]], performed: Iterable[A]) -> list
 
 
 def verdict(gesture: str, act: Act | None, *, answered: bool) -> str:
-    """How a gesture that was said of `act` went: "right", "wrong" or "false". `answered`: one was said of it before."""
+    """The verdict on a gesture event of `act`: "right", "wrong" or "false". `answered`: whether it is a further one."""
     if act is None or answered or act.label == NONE:
         return "false"
     return "right" if gesture == act.label else "wrong"
@@ -73,27 +73,27 @@ def verdict(gesture: str, act: Act | None, *, answered: bool) -> str:
 
 @dataclass(eq=False)
 class Performed:
-    """What the person at the sensor did."""
+    """A performance: what the person at the sensor did."""
 
     label: str  # a gesture, or "none"
-    kind: str  # the finer name
-    onset: float
-    offset: float
-    answered: bool = False
-    unknown: bool = False  # the daemon saw it, and called it unknown
+    kind: str  # a finer name than the label
+    onset: float  # s
+    offset: float  # s
+    answered: bool = False  # whether it had a gesture event
+    unknown: bool = False  # whether it had an unknown event
 
 
 @dataclass(frozen=True)
 class Said:
-    """What a model would have published of one contact, were it sure enough."""
+    """The gesture that a model would publish for one contact if it were sure enough."""
 
     gesture: str
     confidence: float
-    performed: Performed | None  # what was performed then
+    performed: Performed | None  # the performance of the contact
 
 
 def verdicts(said: Iterable[Said], least: float | Mapping[str, float]) -> Iterator[tuple[Said, str]]:
-    """What is published at a threshold, or at one for each gesture, of what is said in order; and how each went."""
+    """Those of `said`, in order, that reach a threshold (one for all, or one by gesture), with their verdicts."""
     answered: set[int] = set()
     for one in said:
         if one.confidence < (least[one.gesture] if isinstance(least, Mapping) else least):
@@ -106,7 +106,7 @@ def verdicts(said: Iterable[Said], least: float | Mapping[str, float]) -> Iterat
 
 @dataclass(frozen=True)
 class Outcome:
-    """One thing that was performed, or recognised, or both; `verdict` says how that went.
+    """A performance, an event, or both, and the verdict on them.
 
     right: the gesture that was performed; wrong: another one; missed: a gesture without an event;
     rejected: no gesture, and no event; false: an event without a gesture.
@@ -121,7 +121,7 @@ class Outcome:
 
 @dataclass
 class Tally:
-    """Feed it what was performed (`begin`), events as they arrive (`hear`) and the time (`settle`)."""
+    """A tally of outcomes, from performances (`begin`), events as they arrive (`hear`) and the time (`settle`)."""
 
     waiting: list[Performed] = field(default_factory=list)
     counts: dict[str, int] = field(
@@ -129,22 +129,22 @@ class Tally:
     )
     latencies: list[float] = field(default_factory=list)
     given: int = 0  # provisional events
-    leads: list[float] = field(default_factory=list)  # s from each that was confirmed to the last touched frame
-    _early: Mapping[str, Any] | None = None  # the last one
+    leads: list[float] = field(default_factory=list)  # s from confirmed provisional events to the last touched frame
+    _early: Mapping[str, Any] | None = None  # the last provisional event
 
     def begin(self, performed: Performed) -> None:
-        """Something is being performed; its end may still lie ahead."""
+        """Take a performance, whose end may still lie ahead."""
         self.waiting.append(performed)
 
     def hear(self, event: Mapping[str, Any], arrived: float) -> Outcome | None:
-        """A gesture, unknown or provisional event; the last two decide nothing yet, a gesture may still follow."""
+        """Take an event; only a gesture has an outcome, since one may still follow an unknown or provisional event."""
         if event["type"] == "provisional":
             self.given, self._early = self.given + 1, event
             return None
         return self.judge(event, arrived, whose(event["onset"], event["offset"], self.waiting))
 
     def judge(self, event: Mapping[str, Any], arrived: float, performed: Performed | None) -> Outcome | None:
-        """The same for a gesture or unknown event, where it is known already to what it belongs."""
+        """Take a gesture or unknown event that belongs to `performed`; returns the outcome of a gesture."""
         early = self._early if event.get("provisional") else None
         if early is not None and event["provisional"] == "confirmed":
             self.leads.append(event["offset"] - early["decided"])
@@ -162,14 +162,14 @@ class Tally:
         return self._count(Outcome(found, performed, event, latency, early))
 
     def settle(self, now: float) -> list[Outcome]:
-        """What nothing can come for any more."""
+        """The outcomes of the performances without a gesture event for which none can come any more at `now` (s)."""
         over = [performed.offset + MISSED_AFTER_S <= now for performed in self.waiting]
         silent = [one for one, late in zip(self.waiting, over, strict=True) if late and not one.answered]
         self.waiting = [one for one, late in zip(self.waiting, over, strict=True) if not late]
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]
 
     def summary(self) -> dict[str, Any]:
-        """The counts, latency and lead in milliseconds (None where too few, or none); provisional events."""
+        """The counts, the numbers of provisional events, and latency and lead in ms (None if there are too few)."""
         ordered = sorted(self.latencies) if len(self.latencies) >= LEAST else []
         return self.counts | {
             "latency_ms_median": round(1000 * median(ordered)) if ordered else None,
@@ -185,9 +185,9 @@ class Tally:
 
 
 def tallied(performed: Sequence[Performed], events: Iterable[Mapping[str, Any]]) -> tuple[Tally, list[Outcome]]:
-    """All that was performed, and all gestures and unknowns that were said of it, once it is over.
+    """The tally of all performances and of all gesture and unknown events, after the last one.
 
-    The outcomes are those of the events, in their order, and then of what nothing was said of.
+    The outcomes are those of the events, in their order, and then those of performances without a gesture event.
     """
     tally, heard = Tally(list(performed)), list(events)
     belongs = owners([(event["onset"], event["offset"]) for event in heard], performed)

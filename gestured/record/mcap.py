@@ -1,7 +1,7 @@
 """The records of an MCAP file (mcap.dev/spec) that may be cut off, damaged or hostile.
 
-The mcap library takes records and chunks apart, once they lie in memory whole; it believes whatever size stands in a
-file. So each record's size, what its chunk unpacks to, and what all of it costs are held against a bound before.
+The mcap library parses records and chunks that lie in memory whole, and believes any size that a file states. So the
+size of each record, the unpacked size of each chunk, and the memory for all of them are checked against bounds before.
 """
 
 import io
@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 MAGIC = b"\x89MCAP0\r\n"
-RECORD_BYTES = 8 << 20  # of one record, and of what a chunk unpacks to; ours have little more than a mebibyte
-GROWTH = 500  # bytes of memory for a byte of the file: an idle sensor that sends zeros leaves next to nothing
+RECORD_BYTES = 8 << 20  # of one record, and of an unpacked chunk; ours have little more than a mebibyte
+GROWTH = 500  # bytes of memory for a byte of the file; large, since frames of zeros are packed to next to nothing
 GROWTH_BYTES = 64 << 20  # bytes of memory for any file, however small
 KEPT_BYTES = 4 << 30  # bytes of memory at most, however large the file is
-UNPACKED_COSTS = 0.25  # bytes of memory for an unpacked byte: little is kept of pictures, but they take time
+UNPACKED_COSTS = 0.25  # bytes of memory that an unpacked byte counts as, since also records that are not kept take time
 
 
 class CutOff(Exception):
@@ -23,29 +23,29 @@ class CutOff(Exception):
 
 
 class Damaged(Exception):
-    """What is wrong with a record; what comes before it is good."""
+    """A record that is damaged, though all records before it are good; the text says what is wrong."""
 
 
 class TooLarge(Exception):
-    """The file becomes larger than any honest one."""
+    """The file takes more memory than any honest one."""
 
 
 class Budget:
-    """The bytes of memory that a file may cost; whoever takes more is told TooLarge."""
+    """The bytes of memory that a file may cost."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._left: float = min(GROWTH_BYTES + GROWTH * os.fstat(file.fileno()).st_size, KEPT_BYTES)
 
     def spend(self, count: float) -> None:
-        """So many bytes stay in memory."""
+        """Count bytes that stay in memory. Raises TooLarge if the budget is spent."""
         self._left -= count
         if self._left < 0:
             raise TooLarge("needs more memory than a recording of its size does; expected a shorter recording")
 
 
 def records(file: BinaryIO, budget: Budget) -> Iterator[Any]:
-    """The library's Channel, Message and Metadata records up to the footer; a chunk's stand in its place."""
-    from mcap.data_stream import ReadDataStream  # who reads no tape need not wait for it
+    """The Channel, Message and Metadata records up to the footer, also of chunks. Raises CutOff, Damaged, TooLarge."""
+    from mcap.data_stream import ReadDataStream  # a slow import, which only tapes need
     from mcap.exceptions import McapError
     from mcap.opcode import Opcode
     from mcap.records import Channel, Chunk, Message, Metadata
@@ -74,7 +74,7 @@ def records(file: BinaryIO, budget: Budget) -> Iterator[Any]:
 
 
 def _whole(file: BinaryIO, size: int) -> bytes:
-    """So many bytes; CutOff where the file ends before."""
+    """The next `size` bytes. Raises CutOff if the file ends before."""
     data = file.read(size)
     if len(data) < size:
         raise CutOff
@@ -82,7 +82,7 @@ def _whole(file: BinaryIO, size: int) -> bytes:
 
 
 def _unpacked(chunk: Any, budget: Budget) -> list[Any]:
-    """The records of a chunk; Damaged where it says another size than it unpacks to."""
+    """The records of a chunk. Raises Damaged if it unpacks to another size than it states."""
     from mcap.stream_reader import breakup_chunk
     from zstandard import frame_content_size
 
@@ -90,7 +90,7 @@ def _unpacked(chunk: Any, budget: Budget) -> list[Any]:
     if chunk.compression not in ("zstd", ""):
         raise Damaged(f"a chunk is packed as {chunk.compression[:20]!r}, expected zstd")
     told = frame_content_size(packed) if chunk.compression else len(packed)
-    if size > RECORD_BYTES or told not in (size, -1):  # where nothing is told (-1), no more than `size` is unpacked
+    if size > RECORD_BYTES or told not in (size, -1):  # without a told size (-1), at most `size` is unpacked
         raise Damaged(f"a chunk unpacks to {told} bytes, expected its {size}, and at most {RECORD_BYTES}")
     budget.spend(UNPACKED_COSTS * size)
     found: list[Any] = breakup_chunk(chunk, validate_crc=True)

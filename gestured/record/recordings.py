@@ -1,4 +1,4 @@
-"""Recordings in memory: the fields of the contract, and what can be asked of them."""
+"""Recordings in memory: the fields of the contract, and methods that read them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Frame, Touch
 
-FINGERS = 3  # of a frame at most
-EVENT = "event_"  # begins the name of each field that is about what was performed in a session
+FINGERS = 3  # of one frame, at most
+EVENT = "event_"  # prefix of the fields about the performances in a session
 
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """G recordings of one grid, N frames in all; `len` is G. Fields as in the contract; None is not known."""
+    """G recordings of one grid, N frames in all; `len` is G. Fields as in the contract; None if not known."""
 
     frames: NDArray[Any]  # (N, R, C) raw counts
     times: NDArray[np.float64]  # (N,) s, strictly increasing within a recording
@@ -24,32 +24,32 @@ class Recordings:
     subjects: NDArray[Any]  # (G,) numbers or names
     speeds: NDArray[Any] | None = None  # (G,) numbers or names
     inclinations: NDArray[Any] | None = None  # (G,) numbers or names
-    kinds: NDArray[np.str_] | None = None  # (G,) the finer name
+    kinds: NDArray[np.str_] | None = None  # (G,) a finer name than the label
     onsets: NDArray[np.integer[Any]] | None = None  # (G,) frame within the recording: first touched
-    releases: NDArray[np.integer[Any]] | None = None  # (G,) last touched
+    releases: NDArray[np.integer[Any]] | None = None  # (G,) frame within the recording: last touched
     touches: NDArray[np.float32] | None = None  # (N, 3, 2) x, y; NaN for no finger
     touch_ids: NDArray[np.int32] | None = None  # (N, 3), -1 for no finger
-    event_recording: NDArray[np.integer[Any]] | None = None  # (E,) what was performed, in which recording
-    event_labels: NDArray[np.str_] | None = None  # (E,)
-    event_kinds: NDArray[np.str_] | None = None  # (E,)
+    event_recording: NDArray[np.integer[Any]] | None = None  # (E,) the recording of each performance
+    event_labels: NDArray[np.str_] | None = None  # (E,) as `labels`
+    event_kinds: NDArray[np.str_] | None = None  # (E,) as `kinds`
     event_onsets: NDArray[np.float64] | None = None  # (E,) s on the recording's times
     event_offsets: NDArray[np.float64] | None = None  # (E,) s
-    sensors: NDArray[np.str_] | None = None  # (G,) the kind of sensor, as "touchscreen"; "" is not said
-    consents: NDArray[np.str_] | None = None  # (G,) day of the participant's consent, YYYY-MM-DD; "" is not known
+    sensors: NDArray[np.str_] | None = None  # (G,) the kind of sensor, such as "touchscreen"; "" if not known
+    consents: NDArray[np.str_] | None = None  # (G,) day of the participant's consent, YYYY-MM-DD; "" if not known
 
     def __len__(self) -> int:
         return len(self.labels)
 
     def frames_of(self, i: int) -> NDArray[Any]:
-        """(T, R, C) raw counts of recording i; IndexError where there is none."""
+        """(T, R, C) raw counts of recording i. Raises IndexError if there is none."""
         return self.frames[self._span(i)]
 
     def times_of(self, i: int) -> NDArray[np.float64]:
-        """(T,) seconds of recording i; IndexError where there is none."""
+        """(T,) times in s of recording i. Raises IndexError if there is none."""
         return self.times[self._span(i)]
 
     def stream(self, i: int) -> Iterator[Frame]:
-        """Recording i as the front end takes it, with its touches."""
+        """The frames of recording i, as the front end takes them, with their touches."""
         span = self._span(i)
         for n in range(span.start, span.stop):
             touches: tuple[Touch, ...] = ()
@@ -77,7 +77,7 @@ class Recordings:
         return Recordings(**taken)
 
     def present(self) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Fields that are known, by name."""
+        """The fields that are known, each with its name."""
         return ((f.name, value) for f in fields(self) if (value := getattr(self, f.name)) is not None)
 
     def _span(self, i: int) -> slice:
@@ -87,7 +87,7 @@ class Recordings:
 
 
 def touch_arrays(frames: Sequence[Frame]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The fields `touches` and `touch_ids` of (N,) frames: what `touches_of` takes, for all of them."""
+    """The fields `touches` (N, 3, 2) and `touch_ids` (N, 3) of N frames; `touches_of` reverts this for one frame."""
     touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
     ids = np.full((len(frames), FINGERS), -1, np.int32)
     for n, frame in enumerate(frames):

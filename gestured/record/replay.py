@@ -1,4 +1,4 @@
-"""A tape through the hub that the daemon uses: the same packets at the same times give the same events."""
+"""The replay of a tape through the hub that the daemon uses: equal packets at equal times give equal events."""
 
 import dataclasses
 import math
@@ -29,13 +29,13 @@ class Maker:
     """What a tape says of the daemon that made it."""
 
     scene: Scene
-    models: list[str]  # as its settings name them, best first
-    sha256: str  # of the one that answered
+    models: list[str]  # as the daemon's settings name them, best first
+    sha256: str  # of the model that answered
     own: Examples = field(default_factory=dict)  # the user's own gestures
 
 
 def opened(path: str | Path) -> tuple[Tape, Maker]:
-    """A tape, and what it says of its daemon. RecordingError names the file."""
+    """The tape in a file, and the daemon that made it. Raises RecordingError, which names the file."""
     found = read(path)
     try:
         return found, maker(found.scene)
@@ -44,7 +44,7 @@ def opened(path: str | Path) -> tuple[Tape, Maker]:
 
 
 def maker(told: Mapping[str, Any]) -> Maker:
-    """A tape's `scene` as a value. Raises RecordingError for one that says something else than a daemon writes."""
+    """The daemon that a tape's `scene` describes. Raises RecordingError for a scene that no daemon writes."""
     settings = told.get("settings")
     if not isinstance(settings, dict):
         raise RecordingError("scene: expected settings, as the daemon writes them")
@@ -67,7 +67,7 @@ def _text(value: object) -> str:
 
 
 class Mute(Classifier):
-    """One that has no answers: for what can be said of the frames alone."""
+    """A classifier that has no answers, for replays that only need the frames."""
 
     def __init__(self, gestures: Sequence[str]) -> None:
         self.gestures = tuple(gestures)
@@ -79,9 +79,9 @@ class Mute(Classifier):
 
 @dataclass
 class Played:
-    """When a replay's sensor was known; times in s since the tape's first packet."""
+    """The times from which on the idle state of a replay's sensor was known, in s since the tape's first packet."""
 
-    _learned: list[tuple[float, float]] = field(default_factory=list)  # since when it was new, and from when on known
+    _learned: list[tuple[float, float]] = field(default_factory=list)  # when it was new, and when it was known
 
     def see(self, taken: Taken) -> None:
         """Remember one more frame that was used."""
@@ -98,7 +98,7 @@ class Played:
 
 
 def frames_used(tape: Tape, scene: Scene) -> dict[str, list[Frame]]:
-    """Sensor -> the frames that the daemon used, at the times that it gave them, in seconds since the epoch."""
+    """By sensor, the frames that the daemon used, at the times that it gave them, in s since the Unix epoch."""
     replay = Replay(tape, dataclasses.replace(scene, touches=True), Mute(scene.gestures))
     used: dict[str, list[Frame]] = {}
     for fact in replay.facts():
@@ -111,7 +111,7 @@ def frames_used(tape: Tape, scene: Scene) -> dict[str, list[Frame]]:
 
 
 class Replay:
-    """Plays a tape with a classifier. The events' times count from its first packet, at `epoch` (s since 1970)."""
+    """Plays a tape with a classifier. The events' times count from the first packet, at `epoch` (s since 1970)."""
 
     def __init__(self, tape: Tape, scene: Scene, classifier: Classifier, *, provisional: bool = False) -> None:
         """`provisional`: whether provisional events are given, too.
@@ -127,26 +127,26 @@ class Replay:
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9
         self._tape = tape
-        # By sensor and the time of packets (ns): when contacts began that these opened in the daemon, in s since 1970.
+        # By sensor and the time of packets (ns): onsets of the contacts that these opened in the daemon, s since 1970.
         self._told: dict[tuple[str, int], list[float]] = {}
         for t_ns, event in zip(tape.told_ns, tape.events, strict=False):
             if event["type"] == "onset":
                 self._told.setdefault((event["sensor"], t_ns), []).append(event["onset"])
-        self._ahead: dict[str, list[float]] = {}  # by sensor: s by which the daemon's time of a contact was later
+        self._ahead: dict[str, list[float]] = {}  # by sensor: s by which onsets were later in the daemon
 
     def events(self) -> Iterator[Event]:
-        """All that comes of it, to the end, where every sensor falls silent."""
+        """All events of the tape, at whose end every sensor falls silent."""
         for fact in self.facts():
             if not isinstance(fact, Decided | Arrived | Taken | Dropped | Changed):
                 yield fact
 
     def facts(self) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
-        """The same with all else that the hub tells of; frames are told of one by one."""
+        """All facts of the tape, events included; each frame that was used is a fact of its own."""
         now = 0.0
         gates = deque(event for event in self._tape.events if event["type"] == "gate")
         for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
             now, before = (t_ns - self._start) / 1e9, now
-            if not self._tape.scene:  # no daemon made it, of which packets alone would tell how long it stood still
+            if not self._tape.scene:  # made by no daemon that could have stood still: a pause is a silence
                 silent = before + 2 * self._hub.scene.stale_s
                 yield from self._seen(self._hub.tick(silent) if silent < now else [])
             while gates and gates[0]["since"] - self.epoch < now:
@@ -158,7 +158,7 @@ class Replay:
         yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
 
     def _compare(self, opened: list[Onset], t_ns: int) -> None:
-        """Hold the contacts that the packets of `t_ns` have opened here against those in the daemon."""
+        """Compare the contacts that the packets of `t_ns` opened here with those that they opened in the daemon."""
         for sensor in {one.sensor for one in opened}:
             here = [one.onset + self.epoch for one in opened if one.sensor == sensor]
             there = self._told.get((sensor, t_ns), [])
@@ -166,20 +166,20 @@ class Replay:
                 self._ahead.setdefault(sensor, []).extend(map(sub, there, here))
 
     def epoch_of(self, sensor: str) -> float:
-        """What makes the times of a sensor the daemon's, in s since 1970, as far as it has been played.
+        """The s to add to a sensor's times to get the daemon's, in s since 1970, as far as the tape was played.
 
-        A sensor's own clock may have been ahead where the tape begins, which packets do not tell. So contacts tell it
-        that the same packets have opened in both.
+        A sensor's own clock may have been ahead at the beginning of the tape, which no packet shows. So the offset is
+        learned from contacts that the same packets have opened here and in the daemon.
         """
         own_clock = self._hub.scene.clock_of(sensor) == "sensor"
         return self.epoch + (median(self._ahead.get(sensor, [0.0])) if own_clock else 0.0)
 
     def knew(self, sensor: str, t: float) -> bool:
-        """Whether a sensor's idle state was known at `t`, in the daemon's time, as far as it has been played."""
+        """Whether a sensor's idle state was known at `t`, in the daemon's time, as far as the tape was played."""
         return sensor in self.played and self.played[sensor].knew(t - self.epoch_of(sensor))
 
     def _gate(self, told: Mapping[str, Any]) -> list[Fact]:
-        """What the tape tells of a sensor's gates; where that was so before its first packet, of its arming, too."""
+        """Set a sensor's gates as the tape has them; if they were so before its first packet, also the arming."""
         since, until = told["since"] - self.epoch, told.get("until")
         if since >= 0 or told.get("armed") is not True or not isinstance(until, int | float):
             return self._hub.put(told["sensor"], told["closed"], max(since, 0.0))
@@ -188,7 +188,7 @@ class Replay:
     def _seen(self, facts: list[Fact]) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
         for fact in facts:
             if isinstance(fact, Fault):
-                raise fact.error  # here nobody depends on the other sensors
+                raise fact.error  # in a replay nobody depends on the other sensors
             if isinstance(fact, Taken):
                 self.played.setdefault(fact.sensor, Played()).see(fact)
             yield fact

@@ -2,8 +2,8 @@
 
 `/gestured/packets` holds each datagram as it came (message encoding `osc`; one channel for each sender, its address in
 the channel's metadata), `/gestured/events` the lines of the event stream (JSON, with a schema). The log time is when
-the daemon read it, in nanoseconds since the epoch; packets of one read have one time. The metadata record `scene` says
-with which model and settings. So a tape replays through the same code to the same events.
+the daemon read the packet, in ns since the Unix epoch; packets of one read have one time. The metadata record `scene`
+has the model and the settings. So a tape replays through the same code to the same events.
 
 A tape is written once, never changed, and is good up to its last whole chunk, wherever writing was cut off.
 """
@@ -15,7 +15,7 @@ from typing import Any
 from gestured.core.address import Address
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
-# Of a line of the event stream; it may say more.
+# The JSON schema of a line of the event stream, which may have more keys.
 EVENT_SCHEMA: dict[str, Any] = {
     "title": "gestured.Event",
     "type": "object",
@@ -42,16 +42,16 @@ EVENT_SCHEMA: dict[str, Any] = {
 class Packet:
     """A datagram as it was recorded."""
 
-    t_ns: int  # when the daemon read it, since the epoch
+    t_ns: int  # when the daemon read it, since the Unix epoch
     source: Address
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Tape:
-    """What a file holds, in the order of writing. `whole` is false where writing was cut off.
+    """The content of a file, in the order of writing. `whole` is false if writing was cut off.
 
-    `told_ns` is when each event was told: the time of the packets that came last before it.
+    `told_ns` has the log time of each event, which is the time of the last packets before it.
     """
 
     scene: Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""A tape that is read; the file may be cut off, damaged or hostile."""
+"""The reading of tapes, whose files may be cut off, damaged or hostile."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,14 +13,14 @@ from gestured.record.mcap import Budget, CutOff, Damaged, TooLarge, records
 from gestured.record.tape import EVENTS, PACKETS, SCENE, Packet, Tape
 
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
-EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
-LATEST_NS = 1 << 62  # of a packet, since 1970: a day in 2116, which a clock here can wait for
+EVENT_COSTS = 24  # bytes of memory for a byte of JSON at worst, when it is all empty lists
+LATEST_NS = 1 << 62  # of a packet, since 1970: a day in 2116, for which a clock here can still wait
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
 
 
 def read(path: str | Path) -> Tape:
-    """Read a file, as far as it is good. Raises RecordingError for what is no tape, and for what wants to be larger."""
+    """Read a file as far as it is good. Raises RecordingError for a file that is no tape or takes too much memory."""
     reading = _Reading()
     whole = True
     try:
@@ -46,21 +46,21 @@ def read(path: str | Path) -> Tape:
 
 
 class _Wrong(Exception):
-    """What a tape says that no tape of ours does."""
+    """Content that no tape of gestured has; the text says which, and what was expected."""
 
 
 class _Reading:
-    """What was found so far."""
+    """The content of a tape that was read so far."""
 
     def __init__(self) -> None:
         self.scene: Mapping[str, Any] | None = None
         self.packets: list[Packet] = []
         self.events: list[Mapping[str, Any]] = []
         self.told_ns: list[int] = []
-        self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" where we do not know it; source
+        self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" if it is not ours; source
 
     def take(self, record: Any, budget: Budget) -> None:
-        """One record; what we do not know is passed over."""
+        """Take one record; unknown ones are skipped."""
         from mcap.records import Channel, Message, Metadata
 
         if isinstance(record, Message):
@@ -87,7 +87,7 @@ class _Reading:
             self.packets.append(Packet(message.log_time, source, data))
         elif topic == EVENTS:
             budget.spend(ITEM_COSTS + EVENT_COSTS * len(data))
-            event = json_object(data)  # as sound as a line that a daemon sends
+            event = json_object(data)  # an event must be as sound as a daemon's line
             wrong = "expected a JSON object" if event is None else wrong_field(event)
             if event is None or wrong is not None:
                 raise _Wrong(f"event {len(self.events) + 1}: {wrong}")
@@ -97,7 +97,7 @@ class _Reading:
 
 def _source(text: str) -> Address:
     host, _, port = text.rpartition(":")
-    if ":" in host and not host.startswith("["):  # as it stands in tapes of before 0.1.0
+    if ":" in host and not host.startswith("["):  # IPv6, as tapes before 0.1.0 have it
         text = f"[{host}]:{port}"
     try:
         if len(host) <= HOST_CHARACTERS:

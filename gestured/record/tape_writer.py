@@ -1,4 +1,4 @@
-"""A tape while it is written."""
+"""The writing of tapes."""
 
 import json
 import os
@@ -13,15 +13,15 @@ from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE
 
 CHUNK_BYTES = 1 << 20  # bytes that are written at a time, unless a flush comes before
 MESSAGE_BYTES = 32  # of the file for a message, besides its content: its header, and its place in the index
-SENDER_CHANNELS = 256  # senders that have a channel of their own; whoever comes after them shares one
+SENDER_CHANNELS = 256  # senders that have a channel of their own; all later ones share one
 
 
 class Writer:
-    """Writes a new file; a context manager. Raises RecordingError where it cannot be made, or exists."""
+    """Writes a new file; a context manager. Raises RecordingError if it cannot be made, or exists."""
 
     def __init__(self, path: Path, scene: Mapping[str, Any], limit_bytes: int) -> None:
-        """Never more than about `limit_bytes` (what is written before the limit stays good)."""
-        from mcap.writer import Writer as Mcap  # who records nothing need not wait for it
+        """Make the file with `scene` as its metadata; `full` tells when it has about `limit_bytes`."""
+        from mcap.writer import Writer as Mcap  # a slow import, which only recording needs
 
         self.path, self.limit_bytes = path, limit_bytes
         try:
@@ -31,8 +31,8 @@ class Writer:
         self._mcap: Any = Mcap(self._file, chunk_size=CHUNK_BYTES)
         self._senders: dict[str, int] = {}
         self._waiting = 0  # bytes that are not in the file yet
-        self._broken = False  # the file took no more
-        self._good = ""  # what to say of the file then
+        self._broken = False  # whether the file took no more
+        self._good = ""  # what an error then says of the file
         try:
             with self._writing():
                 self._mcap.start(profile="gestured", library="gestured")
@@ -40,7 +40,7 @@ class Writer:
                 schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())
                 self._events = self._mcap.register_channel(EVENTS, "json", schema)
             self.flush()
-        except RecordingError:  # a file that is there and holds nothing would refuse the next attempt
+        except RecordingError:  # an empty file that stays would make the next attempt fail
             self.close()
             path.unlink()
             raise
@@ -63,7 +63,7 @@ class Writer:
         self._add(self._events, t_ns, json.dumps(event).encode())
 
     def flush(self) -> None:
-        """From here on, what was kept so far survives a crash and a power cut."""
+        """Put what was kept so far onto the disk, where it survives a crash and a power cut."""
         with self._writing():
             self._mcap.flush()
             os.fsync(self._file.fileno())
