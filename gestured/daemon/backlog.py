@@ -17,7 +17,7 @@ ROOM_BYTES = 52 << 10  # a quarter of the smallest receive buffer that a kernel 
 MOST_BYTES = 32 << 20  # four times the kernel's buffer, which has twice the 4 MiB that we ask for
 FLOOD_S = 1.0  # s of work after which we check whether the backlog shrinks; also the shortest duration of a flood
 PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
-OWNERS_SHARE = 0.75  # of the time in a flood goes to owners of sensors; strangers get the rest
+OWNERS_SHARE = 0.75  # of the time in a flood, for owners of sensors; strangers get the rest
 # s of work that a sender begins with, and may save up, for each sensor that it owns; a stranger has it once. The
 # largest packet of frames costs as much.
 CREDIT_S = 0.02
@@ -35,7 +35,7 @@ class Datagram(NamedTuple):
     arrival: float  # s, monotonic
     packet: bytes
     source: Source
-    cost: float  # s of work, estimated; no more than any sender can save up, so that none is never served
+    cost: float  # s of work, estimated; at most what any sender can save up, so that each is served in the end
 
 
 class Group(NamedTuple):

@@ -19,8 +19,8 @@ from gestured.daemon.sockets import AGAIN_S, reason_of
 
 CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
-LINES = 16  # lines of all clients that are answered before the loop looks after its frames again
-ACCEPTED = 64  # connections that are accepted before the loop looks after its frames again
+LINES = 16  # requests of all clients that are answered before the loop serves frames again
+ACCEPTED = 64  # connections that are accepted before the loop serves frames again
 DRAINED_S = 0.01  # at the end, the pause between two checks whether lines still wait
 
 

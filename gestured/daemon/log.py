@@ -133,7 +133,7 @@ def close() -> None:
 
 
 class _Printer:
-    """What structlog hands finished lines to."""
+    """The logger to which structlog hands finished lines."""
 
     def msg(self, line: str) -> None:
         print_log(line)

@@ -22,7 +22,7 @@ KEYS = (*FLAGS, "config")  # settings that a variable can set
 # Variables by which Kubernetes and Docker tell containers of a service, such as GESTURED_PORT_9000_UDP_ADDR.
 SERVICE = re.compile(r"GESTURED_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(ADDR|PORT|PROTO))?)")
 PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # set by a platform if its value is a URL, such as tcp://10.96.0.17:9000
-MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
+MAX_CONFIG_BYTES = 1 << 20  # of a configuration; one with the most sensors has a small part of these
 
 
 def _from_file(path: str) -> dict[str, Any]:

@@ -80,7 +80,7 @@ class Parts:
         return max(self.pulse.lag_s, self.receiver.behind_s)
 
     def readings(self) -> dict[str, Reading]:
-        """What is known of each sensor, heard or in the configuration."""
+        """The reading of each sensor, heard or in the configuration."""
         return self.hub.readings(self.served)
 
     def listening(self) -> dict[str, dict[str, Any]]:

@@ -77,7 +77,7 @@ class Service:
             self._http = serve_pages(bound.http, self.parts)
 
     def _sinks(self) -> tuple[Sink, ...]:
-        """The sinks of events: those who act on them before those who look on."""
+        """The sinks of events: clients and outputs, which may act on an event, come before taps and views."""
         parts = self.parts
         return (parts.clients, *parts.asked.outputs, parts.taps, parts.views)
 
@@ -88,7 +88,7 @@ class Service:
         return messages.hello_json(__version__, parts.instance, *names)
 
     def _known(self) -> dict[str, Sequence[str]]:
-        """What a client may name in a subscription."""
+        """The types, gestures and zones that a client may name in a subscription."""
         scene = self.parts.hub.scene
         zones = dict.fromkeys(name for setup in scene.sensors.values() for name in setup.zones)
         types = [one for one in messages.EVENT_TYPES if scene.touch or one != "touch"]
@@ -121,7 +121,7 @@ class Service:
             await server.start()
 
     async def serve(self, stop: asyncio.Event, reload: asyncio.Event) -> None:
-        """Look after the timers until `stop` is set; then finish what is in flight."""
+        """Run the timers until `stop` is set, and a reload each time that `reload` is; then finish."""
         parts = self.parts
         watchdog = watchdog_period()
         canary = Canary(parts.desk)
@@ -165,7 +165,7 @@ class Service:
             notify(f"STATUS={words}")
 
     async def _finish(self) -> None:
-        """Answer what is in flight, give clients a moment to read it, and say goodbye."""
+        """Answer the open contacts, give clients DRAIN_S to read the answers, and close everything."""
         parts = self.parts
         parts.stopping = True
         notify("STOPPING=1")

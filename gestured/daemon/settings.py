@@ -58,7 +58,7 @@ class ArmingSettings(Part):
 
 
 class GatesSettings(Part):
-    """`[gates]`: what keeps sensors silent."""
+    """`[gates]`: the gates that keep sensors silent."""
 
     start: tuple[GateName, ...] = Field(
         default=(), description="names of gates that are closed at every start, until they are allowed"

@@ -165,7 +165,7 @@ class UnixListener(Listener):
 
 def _remove(path: Path, ours: os.stat_result) -> None:
     """Remove a file if it is still the one that we made."""
-    with suppress(OSError):  # somebody removed it already
+    with suppress(OSError):  # the file is gone already
         if os.path.samestat(path.lstat(), ours):
             path.unlink()
 

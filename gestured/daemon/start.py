@@ -134,7 +134,7 @@ def _end_surely(loop: asyncio.AbstractEventLoop, served: threading.Event) -> Non
 
     def watch() -> None:
         while number := signals.recv(1):
-            with suppress(RuntimeError):  # the loop is closed: what is left is the end of the process
+            with suppress(RuntimeError):  # the loop is closed, and only the end of the process is left
                 loop.call_soon_threadsafe(lambda: None)
             if number[0] in STOPS:
                 time.sleep(END_S)

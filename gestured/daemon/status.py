@@ -89,7 +89,7 @@ def status(parts: Parts) -> dict[str, Any]:
 
 
 def healthy(parts: Parts) -> dict[str, Any]:
-    """What /healthz says: whether the loop turns."""
+    """The answer of /healthz: whether the loop turns."""
     age_s = parts.pulse.age_s
     return {"healthy": age_s < HANG_S, "loop_age_s": round(age_s, 3)}
 
@@ -140,7 +140,7 @@ def _zones(settings: Settings, name: str) -> dict[str, tuple[float, ...]]:
 
 
 def _ready(parts: Parts, states: Mapping[str, str]) -> dict[str, Any]:
-    """What /readyz says: whether frames that come now would be answered, and why not."""
+    """The answer of /readyz: whether frames that come now would be answered, and why not."""
     reasons = {
         "the event loop hangs": not healthy(parts)["healthy"],
         "the daemon is stopping": parts.stopping,

@@ -37,7 +37,7 @@ class Taps:
         self._live: list[Connection] = []
         self._waiting: deque[Remembered] = deque()  # packets and events that are to be streamed soon
         self._timer: asyncio.Handle | None = None
-        self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
+        self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, packet or line
         self.held_bytes = 0  # in the ring
         self._epoch_ns = 0  # of the live taps
         # By sensor, the latest last: the line of the `Gate` that holds at the beginning of the ring.
@@ -89,7 +89,7 @@ class Taps:
             self._stream()
 
     def flight(self) -> deque[Remembered]:
-        """What the ring holds now, oldest first: the packets themselves, not copies of them."""
+        """The content of the ring, oldest first: the packets themselves, not copies of them."""
         self._forget(time.monotonic_ns())
         return deque((*self._gates.values(), *(what for _, _, what in self._ring)))
 

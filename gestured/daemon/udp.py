@@ -30,10 +30,10 @@ PACKET_BYTES = 65_536
 SLICE_S = 0.005  # s of work on waiting packets before the loop serves everybody else
 FLOOD_SLICE_S = 0.001, 0.01  # s of work on waiting packets in a flood, at least and at most; see `Receiver._slice`
 TURN_S = 0.05  # s, the most work in one turn of a flood, in case packets cost more than their senders' earlier ones
-DRAIN_S = 0.25  # for serving what still waits when the daemon ends
+DRAIN_S = 0.25  # s for serving packets that still wait when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick, since waking for a packet is much of its cost
 FULL_S = 0.25  # s for which a stall explains that the kernel drops packets; if it drops them for longer, it is a flood
-EARLY_S = 0.001  # by which the alarm for a wait is set too early (or too late), since the loop's timers have whole ms
+EARLY_S = 0.001  # s by which the alarm is early (late if packets come often), since the loop's timers have whole ms
 REST = 2  # seconds that the loop has for everything else, for each second that is spent on provisional events
 SPARSE_S = 0.02  # between packets; if they are further apart, the alarm is early, and the end of a wait is met exactly
 STEP_S = 0.05  # by which the wall clock may move against the monotonic one; after a larger step, stamps are not used
@@ -165,7 +165,7 @@ class Receiver:
             self._holding = self._loop.call_later(max(due - now, 0.0), self.read)
 
     def _clocks(self) -> tuple[float, float]:
-        """The time, and the wall clock's lead; read at one moment, so that a stall does not look like a step."""
+        """The time in s, and the wall clock's lead over it, read so that a stall does not look like a step."""
         while True:
             before, wall, now = self._clock(), time.time(), self._clock()
             if now - before < STEP_S:
@@ -185,7 +185,7 @@ class Receiver:
                 stamps.append(ancillary[0][2] if ancillary else b"")
         except (BlockingIOError, InterruptedError):
             return found, stamps, False
-        except (OSError, MemoryError) as error:  # the network reports something else; the socket can still be read
+        except (OSError, MemoryError) as error:  # an error that is about no packet here; the socket can still be read
             self._desk.drop("socket_error", error=str(error))
         return found, stamps, True
 
@@ -309,7 +309,7 @@ class Receiver:
         self._due, self._alarm = math.inf, None
 
     def _count_drops(self, now: float) -> None:
-        """Tell the hub that the kernel has dropped packets since the last look, and whether that makes a flood."""
+        """If the kernel has dropped packets since the last look, tell the hub; if it keeps doing so, begin a flood."""
         drops = kernel_drops(self._sock)
         if drops == self._drops:
             return

@@ -19,7 +19,7 @@ CHARACTERS = 1024  # of one text
 LATEST_S = 1e11  # s, the latest time of a frame: the year 5138; times in ms since 1970 are larger, and so refused
 LARGEST = float(np.finfo(np.float32).max)  # counts, as a sensor can send them
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
-# What a field holds, and its shape: N frames of R x C taxels, G recordings, E performed events.
+# The form of a field's values, and its shape: N frames of R x C taxels, G recordings, E performances.
 INTEGERS, COUNTS, ANY, TEXT = "integers", "integers or floats", "numbers or text", "text"
 FORMS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "frames": (COUNTS, ("N", "R", "C")),

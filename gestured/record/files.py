@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-PRIVATE = 0o600  # whatever is about people: how somebody touches things is personal data
-PUBLIC = 0o644  # what anybody may read, as far as the umask lets them: models, figures, caches of simulated people
+PRIVATE = 0o600  # for data about people: how somebody touches things is personal
+PUBLIC = 0o644  # for files that anybody may read, less the umask: models, figures, caches of simulated people
 
 NOT_REGULAR = "is not a regular file"
 NAME_BYTES = 8  # random bytes in the name of a file that is not complete yet

@@ -26,7 +26,7 @@ from gestured.record.tape_reader import read
 
 @dataclass(frozen=True)
 class Maker:
-    """What a tape says of the daemon that made it."""
+    """The daemon that made a tape, as the tape describes it."""
 
     scene: Scene
     models: list[str]  # as the daemon's settings name them, best first

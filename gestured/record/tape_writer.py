@@ -92,7 +92,7 @@ class Writer:
                     self._mcap.finish()
                     self._file.flush()
         finally:
-            with suppress(OSError):  # what was refused before is refused again
+            with suppress(OSError):  # the error was raised before
                 self._file.close()
 
     def __enter__(self) -> "Writer":
