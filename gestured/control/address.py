@@ -10,7 +10,7 @@ from pathlib import Path
 from gestured.client.address import SOCKET_PATH, control_beside, find_control, find_socket, setting
 from gestured.client.control import Control
 
-LAST_S = 3.0  # for the last lines of a daemon that is to say no more
+LAST_S = 3.0  # how long the last lines of the daemon are waited for after `finish`
 
 
 def add_sockets(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +22,7 @@ def add_sockets(parser: argparse.ArgumentParser) -> None:
 
 def _path(text: str) -> Path:
     path = Path(text)
-    if not path.name:  # as a variable that is not set leaves it
+    if not path.name:  # such as the empty text of a shell variable that is not set
         raise argparse.ArgumentTypeError(f"{text!r}: expected {SOCKET_PATH}")
     return path
 
@@ -35,7 +35,7 @@ def control_path(args: argparse.Namespace) -> Path:
 
 
 def event_path(args: argparse.Namespace) -> Path:
-    """The event socket that `--socket` or `--control` means; of the latter the daemon is asked. Raises Unreachable."""
+    """The event socket that `--socket` names, or that the daemon on `--control` tells. Raises Unreachable, Refused."""
     if args.socket is not None:
         return Path(args.socket)
     control = args.control
@@ -50,13 +50,13 @@ def event_path(args: argparse.Namespace) -> Path:
 
 
 def finish(control: Control) -> None:
-    """Let `control.lines()` end: with what the daemon has said by now, or after LAST_S, since it may hang."""
+    """Let `control.lines()` end after what the daemon has sent by now, or after LAST_S, since the daemon may hang."""
     control.finish()
     _later(LAST_S, control.close)
 
 
 def finish_after(control: Control, seconds: float) -> None:
-    """Let `control.lines()` end after so long."""
+    """Let `control.lines()` end after so many seconds."""
     _later(seconds, partial(finish, control))
 
 
@@ -67,5 +67,5 @@ def _later(seconds: float, act: Callable[[], object]) -> None:
 
 
 def connect(args: argparse.Namespace) -> Control:
-    """The daemon that `--control` or `--socket` names. Raises Unreachable."""
+    """A connection to the daemon that `--control` or `--socket` names. Raises Unreachable."""
     return Control(control_path(args))

@@ -26,7 +26,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what is known of the model; 3 and the reason where it cannot be used."""
+    """Print what is known of the model. If it cannot be used, print the reason and return 3."""
     try:
         report = check(args.model)
     except ModelError as error:

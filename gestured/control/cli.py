@@ -7,7 +7,7 @@ from importlib import import_module
 
 from gestured.client import program
 
-# Which module adds which subcommands: only that of the one that runs is imported.
+# (module, the subcommands that it adds): only the module of the subcommand that runs is imported.
 SUBCOMMANDS = (
     ("status", ("status",)),
     ("listen", ("listen",)),
@@ -29,7 +29,7 @@ SUBCOMMANDS = (
 
 
 def parser(argv: Sequence[str] = ()) -> program.Parser:
-    """The command line, as far as these arguments need it; each subcommand adds itself and sets `run`."""
+    """The parser of gesturectl, with the subcommand that `argv` names, or else all; each subcommand sets `run`."""
     top, commands = program.program(
         "gesturectl",
         "COMMAND",
@@ -43,13 +43,13 @@ def parser(argv: Sequence[str] = ()) -> program.Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one subcommand; returns the exit status (0 as asked, 1 failed, 2 usage, 3 unusable model)."""
+    """Run one subcommand; returns the exit status (0 done, 1 failed, 2 wrong usage, 3 unusable model)."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without block characters shows question marks
     try:
         given = sys.argv[1:] if argv is None else argv
         return program.run(parser(given), given)
-    except KeyboardInterrupt:  # while the modules of the command were imported: nothing has been done
+    except KeyboardInterrupt:  # Ctrl-C during the imports, before anything was done
         return 1
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+    except BrokenPipeError:  # the reader of our output, such as `head`, has ended
         return 0

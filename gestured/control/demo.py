@@ -1,4 +1,4 @@
-"""`gesturectl demo`: the real daemon, a simulated sensor over real UDP, and how well they get on."""
+"""`gesturectl demo`: a daemon and a simulated sensor over UDP, and what is performed beside what is recognised."""
 
 import argparse
 import math
@@ -32,12 +32,12 @@ from gestured.record.judge import Outcome, Performed, Tally
 from gestured.simulator import Take
 
 DEMO_SENSOR = "demo"
-SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
-DRAWN_AFTER_S = 0.1
+SLACK_S = 0.3  # a picture begins so long before the onset, and the demo ends so long after the last frame
+DRAWN_AFTER_S = 0.1  # a picture ends so long after the offset
 POLL_S = 0.05
-BEGUN_S = 5.0  # how long the pad waits at most for the simulated sensor to send first
-GONE_S = 3.0  # without a page a pad counts as closed: a page that is loaded again comes back within that time
-HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
+BEGUN_S = 5.0  # the longest wait for the first packet of the simulated sensor
+GONE_S = 3.0  # a pad counts as closed after so long without a page, since a reload of the page takes less
+HEARD = ("gesture", "unknown", "provisional")  # the types of events that the demo subscribes to
 
 
 def add(commands: Commands) -> None:
@@ -57,12 +57,12 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
+    """Show outcomes as they come, then the summary; Ctrl-C skips to the summary."""
     stop_as_by_ctrl_c()
     take = performance(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
-    flags = ("--flight-recorder", "4", "--touch", "true")  # so that its page can flag answers and move sliders
+    flags = ("--flight-recorder", "4", "--touch", "true")  # for the flag and the sliders of the page
     with Engine(args.model, rows, columns, *flags) as engine:
         control = Path(engine.ready["control"])
         try:
@@ -93,20 +93,20 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def page(control: Path) -> Iterator[str]:
-    """`gesturectl view` in a process of its own; the address of its page, which is shown and never opened."""
+    """Run `gesturectl view` as a child; gives the address of its page, which no browser is started for."""
     command = [*child_of_ours("gestured.control"), "view", "--listen", "127.0.0.1:0", "--control", str(control)]
     with Popen(command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL, text=True) as process:
         try:
             yield process.stdout.readline().strip() if process.stdout is not None else ""
         finally:
             process.terminate()
-            process.wait()  # after Ctrl-C `Popen` itself waits for a quarter of a second at most
+            process.wait()  # since `Popen` waits a quarter of a second at most after Ctrl-C
 
 
 def pad(engine: Engine, grid: tuple[int, int], rate_hz: float, after: Sensor) -> PadServer:
-    """A pad that sends to the demo's daemon, on any free port; a context manager.
+    """A pad that sends to the demo's daemon, served on any free port; a context manager.
 
-    It begins after the simulated sensor, since the page shows the sensor that was heard first.
+    The pad begins after the simulated sensor, since the page of `view` shows the sensor that was heard first.
     """
     after.begun.wait(BEGUN_S)
     server = PadServer(Address("127.0.0.1", 0), Pad(engine.listen, "pad", grid, min(rate_hz, 200.0)), "the demo")
@@ -115,7 +115,7 @@ def pad(engine: Engine, grid: tuple[int, int], rate_hz: float, after: Sensor) ->
 
 @contextmanager
 def sending(to: Address, take: Take) -> Iterator[Sensor]:
-    """The simulated sensor, which sends its take meanwhile, and in the end has sent its last packet."""
+    """A simulated sensor that sends a take in a thread; on exit it stops, and its thread has ended."""
     with closing(Sensor(to, Form(DEMO_SENSOR))) as sensor:
         sender = threading.Thread(target=sensor.send, args=(frames(0.0, take),), daemon=True)
         sender.start()
@@ -127,14 +127,14 @@ def sending(to: Address, take: Take) -> Iterator[Sensor]:
 
 
 def await_closed(server: PadServer) -> None:
-    """Wait until no page shows the pad any more, or nobody has touched it for long."""
+    """Wait until no page has shown the pad for GONE_S, or the server ends since nobody touches the pad."""
     shown = time.monotonic()
     while time.monotonic() - shown < GONE_S and not server.ended.wait(POLL_S):
         shown = time.monotonic() if server.open else shown
 
 
 class Show:
-    """The running comparison of one take with the events that come of it."""
+    """The comparison of one take with its events, shown while it runs."""
 
     def __init__(self, take: Take, model: str, as_json: bool) -> None:
         self.take, self.model = take, model
@@ -142,16 +142,16 @@ class Show:
         self.colour = in_colour()
         self.tally, self.felt = Tally(), Felt(self.colour)
         self.screen = Screen() if sys.stdout.isatty() and not as_json else None
-        self._views: queue.Queue[dict[str, Any] | None] = queue.Queue()  # lines of the daemon, for the screen
+        self._views: queue.Queue[dict[str, Any] | None] = queue.Queue()  # what the daemon streams, for the screen
 
     def say(self, *lines: str) -> None:
-        """Words for a person."""
+        """Print lines for a person, unless the output is JSON."""
         if not self.as_json:
             say(*lines)
 
     @contextmanager
     def drawn(self, control: Path) -> Iterator[None]:
-        """Meanwhile a terminal shows the sensor as the daemon with this control socket feels it."""
+        """Show the sensor on a terminal meanwhile, as the daemon with this control socket sees it."""
         if self.screen is None:
             yield
             return
@@ -161,7 +161,7 @@ class Show:
             yield
 
     def follow(self, sensor: Sensor, stream: Subscriber) -> None:
-        """Show what comes of the take as it is sent, until its end; at a terminal also the finger as it moves."""
+        """Show the outcomes of the take while it is sent. Raises GesturedError if the daemon closes the connection."""
         heard = read_ahead((time.time(), event) for event in stream)
         ahead = list(self.take.events)
         end = sensor.moment(float(self.take.times[-1]) + SLACK_S)
@@ -186,13 +186,13 @@ class Show:
             self._show(outcome, sensor)
 
     def conclude(self) -> None:
-        """The summary of what was shown."""
+        """Print the summary, and what to do next."""
         figures = self.tally.summary()
         if self.as_json:
             say_json({"type": "summary"} | figures)
         else:
             say_drawn(in_words(figures, self.colour))
-            program = Path(sys.argv[0]).absolute()  # uvx, pipx and make keep it where a shell does not look
+            program = Path(sys.argv[0]).absolute()  # uvx, pipx and make keep it outside of PATH
             found = [f'  export PATH="{program.parent}:$PATH"'] if program.name == "gesturectl" else []
             say(
                 "",
@@ -208,7 +208,7 @@ class Show:
             )
 
     def _draw(self) -> None:
-        """The newest view that has come."""
+        """Draw the newest view that has come, if any."""
         came = [self._views.get() for _ in range(self._views.qsize())]
         views = [line for line in came if line is not None and line["type"] == "view"]
         if self.screen is not None and views:

@@ -1,4 +1,4 @@
-"""What a recording's events and those of its replay have in common, and where they differ."""
+"""The comparison of a recording's events with those of its replay."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping
@@ -10,15 +10,15 @@ from gestured.client.say import shown
 from gestured.control.show import clock
 from gestured.record.replay import opened
 
-ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
-CONFIDENCE_TOLERANCE = 0.05  # what a baseline learned at another moment may change
+ONSET_S = 0.25  # answers whose onsets are at most so far apart are about the same contact
+CONFIDENCE_TOLERANCE = 0.05  # a baseline that was learned at another moment may change a confidence by so much
 
-Line = Mapping[str, Any]  # of the event stream; its times are the recording's
-Knew = Callable[[str, float], bool]  # whether a sensor's idle state was known at a time (s)
+Line = Mapping[str, Any]  # of the event stream, with the recording's times
+Knew = Callable[[str, float], bool]  # whether the idle sensor of that name was known at a time (s)
 
 
 class Answer(NamedTuple):
-    """What became of one contact."""
+    """The answer to one contact."""
 
     sensor: str
     onset: float  # s since the epoch, or on a stopwatch
@@ -26,45 +26,45 @@ class Answer(NamedTuple):
     confidence: float | None
 
     def words(self) -> str:
-        """The answer as a line that a person reads."""
+        """The answer as a line for a person."""
         sure = "" if self.confidence is None else f" {self.confidence:.3f}"
         return f"{clock(self.onset)} {self.sensor}: {self.answer}{sure}"
 
 
 class Difference(NamedTuple):
-    """One contact that was answered differently; None where one side has no such contact."""
+    """One contact that was answered differently; None for a side without such a contact."""
 
     recorded: Answer | None
     replayed: Answer | None
 
     @property
     def names(self) -> tuple[str, str]:
-        """What was recorded and what the replay says, without how sure; "nothing" for a side without the contact."""
+        """The recorded and the replayed answer without confidences; "nothing" for a side without the contact."""
         recorded, replayed = ("nothing" if one is None else one.answer for one in self)
         return recorded, replayed
 
     def words(self) -> str:
-        """For a person: `-` is what was recorded, `+` what the replay says."""
+        """The two answers in lines for a person: `-` is the recorded one, `+` the replayed one."""
         return "\n".join(
             shown(f"{sign} {one.words()}") for sign, one in zip("-+", self, strict=True) if one is not None
         )
 
 
-Verdict = tuple[str, int, list[Difference]]  # what was compared, how many were not, and where it differs
+Verdict = tuple[str, int, list[Difference]]  # what was compared, how many contacts were not, differences
 
 
 class Recorded:
-    """What `gesturectl record` or `flag` wrote. Raises RecordingError."""
+    """A tape that `gesturectl record` or `flag` wrote, to be compared with its replay. Raises RecordingError."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.tape, self.maker = opened(path)
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
-        """Hold the events of a replay against those that were recorded."""
+        """Compare the events of a replay with the recorded ones."""
         before = answers(self.tape.events)
+        # A daemon that knew the sensor before the recording began has answered contacts that a replay cannot answer.
         usable = [answer for answer in before if knew(answer.sensor, answer.onset)]
-        # A daemon that knew the sensor from before answers earlier: that was not asked.
         after = [answer for answer in answers(lines) if knew(answer.sensor, answer.onset)]
         return f"{len(usable)} recorded answers", len(before) - len(usable), differences(usable, after)
 
@@ -86,7 +86,7 @@ def answers(lines: Iterable[Line]) -> list[Answer]:
 
 
 def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Difference]:
-    """Contacts are matched by their onsets; what is alike on both sides is left out."""
+    """The contacts that were answered differently, matched by their onsets."""
     by_onset = attrgetter("onset")
     rest = sorted(after, key=by_onset)
     found = []

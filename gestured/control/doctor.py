@@ -29,8 +29,8 @@ from gestured.core.errors import GesturedError
 YEAR_S = 365 * 86_400
 RELEASED = 1_750_000_000  # s since the epoch; a clock before that is wrong
 BRIDGES = ("gestured-bridge@*", "gestured-serial@*")  # units of systemd
-SYSTEMD_S = 5.0  # for its answer, which takes milliseconds
-LOOK_S = 1.5  # how long packets are looked at where the daemon drops some: 22 frames of a usual sensor
+SYSTEMD_S = 5.0  # the longest wait for systemctl, which takes milliseconds
+LOOK_S = 1.5  # how long packets are looked at if the daemon drops some: 22 frames at 15 Hz
 
 
 def add(commands: Commands) -> None:
@@ -48,7 +48,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look at everything, and say it."""
+    """Print all findings; returns 1 if any is bad."""
     bad = 0
     for finding in examine(control_path(args)):
         bad += finding.level == "bad"
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def examine(path: Path) -> Iterator[Finding]:
-    """Everything, from the machine to the sensors."""
+    """All findings, from the machine to the sensors of the daemon whose control socket is at `path`."""
     yield _versions()
     yield _clock(time.time())
     yield _buffer(Path("/proc/sys/net/core/rmem_max"))
@@ -94,19 +94,19 @@ def examine(path: Path) -> Iterator[Finding]:
 
 
 def _elsewhere(path: Path, others: list[Path]) -> Finding:
-    """A daemon runs, but not where it was looked for."""
+    """The finding that daemons run, but none on `path`."""
     sockets = [shlex.quote(str(other.with_suffix(".sock"))) for other in others]
     remedy = f"export GESTURED_SOCKET={sockets[0]} names it to all commands, --socket {sockets[0]} to one"
     return Finding("bad", f"no daemon on {path}, but one whose event socket is {', '.join(sockets)}", remedy)
 
 
 def _proposed(control: Control) -> list[str]:
-    """What to set for what arrives now; nothing where all that arrives fits."""
+    """Lines for the configuration file, from the packets that arrive now; none if these fit the settings."""
     sight = Sight()
     try:
         told = overhear(control, LOOK_S, sight)
     except GesturedError:
-        return []  # it has ended meanwhile, or cannot show its packets
+        return []  # the daemon has ended meanwhile, or cannot show its packets
     lines = propose(sight.rows(), told)
     return lines if lines and lines[0].startswith(("[", "#")) else []
 
@@ -144,12 +144,12 @@ def _buffer(path: Path) -> Finding:
 
 
 def _bridges() -> Iterator[Finding]:
-    """The bridges that systemd runs, by what they last said of themselves."""
+    """A finding for each bridge that systemd runs, from the bridge's status line."""
     command = ["systemctl", "show", "--property=Id,ActiveState,StatusText", *BRIDGES]
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=SYSTEMD_S)
     except (OSError, subprocess.TimeoutExpired):
-        return  # no systemd here
+        return  # no systemd here, or none that answers
     for block in done.stdout.split("\n\n"):
         unit = dict(line.partition("=")[::2] for line in block.splitlines())
         if not unit.get("Id"):
@@ -165,7 +165,7 @@ def _bridges() -> Iterator[Finding]:
 
 
 def _port(address: Address) -> Finding:
-    """Whether the daemon could have its usual port."""
+    """Whether the daemon could listen at its default address."""
     where = f"udp {address}"
     with socket.socket(type=socket.SOCK_DGRAM) as probe:
         try:

@@ -1,4 +1,4 @@
-"""`gesturectl enrol`: a gesture of one's own is taught."""
+"""`gesturectl enrol`: teach the daemon a gesture of the user's own."""
 
 import argparse
 from typing import Any
@@ -35,7 +35,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Enrol it; 1 where it was given up."""
+    """Enrol the gesture, and print how each example was judged; returns 1 if it was given up."""
     try:
         with connect(args) as control:
             control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)

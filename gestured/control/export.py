@@ -1,4 +1,4 @@
-"""`gesturectl export`: a recording as frames, in the form that NumPy reads."""
+"""`gesturectl export`: write the frames of a tape as .npz."""
 
 import argparse
 from pathlib import Path
@@ -34,7 +34,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Decode, stamp and write."""
+    """Write the .npz, and print what it holds."""
     names, made = sessions_of(args.file, args.sensor)
     recording.write(args.out, made)
     frames, events = len(made.frames), 0 if made.event_labels is None else len(made.event_labels)
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recordings]:
-    """The sensors of a tape, or the one, and a session of each. Raises RecordingError."""
+    """The sensors of a tape, or the one named `sensor`, and a session of each. Raises RecordingError."""
     found, known = opened(path)
     sessions = {name: used for name, used in frames_used(found, known.scene).items() if sensor in (None, name)}
     if not sessions:

@@ -1,4 +1,4 @@
-"""What the doctor finds in a daemon's status: of itself, its model, its input, its sensors and its output."""
+"""The doctor's findings in a daemon's status: daemon, model, input, sensors and output."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,22 +11,22 @@ from gestured.core.errors import ModelError
 from gestured.core.timing import outside as rate_is_outside
 from gestured.model.opening import check
 
-BUFFER_BYTES = 4 << 20  # the receive buffer that the daemon asks of the kernel
-SLOW_S = 0.1
-RECENT_S = 60.0  # what has not happened for so long is over
+BUFFER_BYTES = 4 << 20  # the receive buffer that the daemon asks the kernel for
+SLOW_S = 0.1  # the daemon is too slow if its loop lags by more
+RECENT_S = 60.0  # a fault that has not happened again for so long is over
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at: "ok", "warn" (it works, but) or "bad", and the remedy where it is not ok."""
+    """One thing that was looked at, and the remedy if it is not ok."""
 
-    level: str
+    level: str  # "ok", "warn" (it works, but not as it should) or "bad"
     what: str
     remedy: str = ""
-    sensor: str = ""  # that it is about; "" where it is about no single one
+    sensor: str = ""  # name of the sensor that is meant; "" for a finding about none or several
 
 
-DROPS = {  # why, and what to do
+DROPS = {  # by reason: what the dropped packets did, and what to do
     "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
     "size": "had another number of taxels than the grid: gesturectl sniff proposes one",
     "types": "held neither numbers nor one blob: wire.md says what a frame is, gesturectl sniff what arrives",
@@ -39,7 +39,8 @@ DROPS = {  # why, and what to do
 }
 
 
-STATES = {  # of a sensor: level, what it is unless its status says why, with keys of that status, and what to do
+# By state of a sensor: level, words (used if the status gives no reason; its keys are filled in), remedy.
+STATES = {
     "ok": ("ok", "{rate_hz:.1f} Hz from {source}", ""),
     "starting": ("warn", "is being learned", "leave it untouched for a second"),
     "degraded": (
@@ -64,7 +65,7 @@ STATES = {  # of a sensor: level, what it is unless its status says why, with ke
 
 
 def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iterator[Finding]:
-    """What the daemon's answer to `status` shows; `proposed` is what to set for what arrives, where it does not fit."""
+    """The findings in the daemon's answer to `status`; `proposed` has the lines of `propose` if packets do not fit."""
     for look in (_daemon, _ports, _active_model):
         yield from look(status)
     if proposed:
@@ -76,19 +77,19 @@ def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iter
 
 
 def examine_sensors(status: dict[str, Any]) -> Iterator[Finding]:
-    """What the daemon's answer to `status` shows of what arrives, of its sensors, and of its gates."""
+    """The findings about input, sensors and gates in the daemon's answer to `status`."""
     for look in (_input, _sensors, _gates):
         yield from look(status)
 
 
 def dropping(status: dict[str, Any]) -> bool:
-    """Whether the daemon has dropped something within RECENT_S."""
+    """Whether the daemon has dropped packets within RECENT_S."""
     ages = _ages(status, "dropped")
     return any(ages.get(reason, math.inf) <= RECENT_S for reason in status["input"]["dropped"])
 
 
 def model_finding(name: str, sha256: str | None) -> Finding:
-    """Whether a model can be used, and is the one that runs."""
+    """Whether a model can be used, and is the running one, whose checksum `sha256` is (None if none runs)."""
     try:
         report = check(name)
     except ModelError as error:
@@ -116,7 +117,7 @@ def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
         yield Finding("bad", found.what, "report them with the daemon's log")
     if status["reloads"].get("refused"):
         ages = _ages(status, "reloads")
-        if ages.get("refused", 0.0) <= ages.get("done", math.inf):  # none has succeeded since
+        if ages.get("refused", 0.0) <= ages.get("done", math.inf):  # no reload has succeeded since
             refused = f"{status['reloads']['refused']} reloads were refused"
             yield Finding("warn", refused, "gesturectl reload says why")
 
@@ -149,12 +150,12 @@ def _input(status: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _ages(status: dict[str, Any], key: str) -> Any:
-    """How long ago something last happened, in s; by label, where it has some. A daemon of before does not say."""
+    """How long ago something last happened, in s, by label if it has labels; an older daemon does not tell."""
     return status.get("last_s_ago", {}).get(key, {} if key != "kernel_drops" else None)
 
 
 def _dated(what: str, seconds: float | None, remedy: str) -> Finding:
-    """What has happened, last so many seconds ago: after RECENT_S without it there is nothing to remedy."""
+    """A finding about something that last happened so many `seconds` ago: "ok" after RECENT_S without it."""
     if seconds is None or seconds <= RECENT_S:
         when = "" if seconds is None else f", the last {seconds:.0f} s ago"
         return Finding("warn", what + when, remedy)
@@ -173,7 +174,7 @@ def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
-    if found := STATES.get(sensor["state"]):  # else a later daemon's
+    if found := STATES.get(sensor["state"]):  # a newer daemon may have other states
         level, what, remedy = found
         yield Finding(level, sensor.get("reason") or what.format(**sensor), remedy.format(name=name))
     if sensor.get("closed"):
@@ -202,7 +203,7 @@ def _gates(status: dict[str, Any]) -> Iterator[Finding]:
 def _own(status: dict[str, Any]) -> Iterator[Finding]:
     for said in own_faults(status):
         remedy = "gesturectl forget NAME, or another model"
-        if said == status["own"]["fault"]:  # where it cannot be written, it says itself what to do
+        if said == status["own"]["fault"]:  # a fault of a file that cannot be written names its own remedy
             remedy = "" if "--own-gestures" in said else "mend or remove the file, then gesturectl reload"
         yield Finding("warn", f"own gestures: {said}", remedy)
 

@@ -1,4 +1,4 @@
-"""`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
+"""`gesturectl flag`: keep what the flight recorder holds as a tape, after a wrong answer."""
 
 import argparse
 from datetime import datetime
@@ -14,7 +14,7 @@ from gestured.control.record import Keeper
 from gestured.core.errors import GesturedError
 from gestured.record.tape_writer import Writer
 
-LIMIT_BYTES = 2 << 30  # more than the ring may hold
+LIMIT_BYTES = 2 << 30  # more than the flight recorder may hold
 
 
 def add(commands: Commands) -> None:
@@ -34,7 +34,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fetch it and write it."""
+    """Fetch what the flight recorder holds, write it, and print how much it is."""
     path = args.file or flag_path(Path())
     with connect(args) as control:
         keeper = flag(control, path, args.note)
@@ -45,14 +45,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def flag_path(folder: Path) -> Path:
-    """A name for what is flagged now, which no file has."""
+    """The path of a new file in `folder` that is named after the local time."""
     stem = f"flag-{datetime.now():%Y%m%d-%H%M%S}"
     names = chain([stem], (f"{stem}-{n}" for n in count(2)))
     return next(path for name in names if not (path := folder / f"{name}.mcap").exists())
 
 
 def flag(control: Control, path: Path, note: str) -> Keeper:
-    """Fetch what the flight recorder holds, and write it. Raises Refused where it is off, and Unreachable."""
+    """Fetch what the flight recorder holds, and write it. Raises Refused if it is off, Unreachable, GesturedError."""
     scene = control.ask("flight")
     with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape, control.reading():
         keeper = Keeper(tape, scene)

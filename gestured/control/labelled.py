@@ -1,4 +1,4 @@
-"""Labelled recordings (.npz) as something to play, and their labels as the answers that are expected."""
+"""Labelled recordings (.npz) as packets to play, and their labels as the expected answers."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -19,23 +19,23 @@ from gestured.record.check import SESSION
 from gestured.record.judge import NONE, Outcome, Performed, tallied
 from gestured.record.tape import Packet, Tape
 
-BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
-SOURCE = Address("127.0.0.1", 9)  # a sender to stand for the file; port 9 discards, and nobody sends from it
-STANDS_OUT = 0.5  # share of the largest excursion of any taxel, from which on a touch has begun: far above the noise
+BETWEEN_RECORDINGS_S = 3.0  # a pause long enough for every contact of the last recording to be answered
+SOURCE = Address("127.0.0.1", 9)  # stands for the file as the sender; nobody sends from port 9 (discard)
+STANDS_OUT = 0.5  # of the largest excursion of any taxel: a touch has begun if one goes so far, well above the noise
 DIFFERENT = ("wrong", "missed", "false")
 
 
 def stands_out(frames: NDArray[Any]) -> int:
-    """The first of (T, R, C) frames that is far from what the sensor mostly shows: about where a touch begins."""
+    """The index of the first of (T, R, C) frames that is far from the median frame: about where a touch begins."""
     way = np.abs(frames - np.median(frames, axis=0)).max(axis=(1, 2))
     return int(np.argmax(way >= STANDS_OUT * way.max()))
 
 
 class Labelled:
-    """A file in the contract's form, played as one sensor, one recording after the other. Raises RecordingError.
+    """A labelled .npz, played as one sensor, one recording after the other. Raises RecordingError.
 
-    Before each recording the frame counter leaps, as that of a sensor which starts anew: each is learned by itself.
-    Where nobody has marked when a performance began, it begins where the frames first stand out.
+    The frame counter leaps before each recording, like that of a sensor that restarts, so that the idle sensor is
+    learned anew. A performance whose onset nobody has marked begins with the first frame that stands out.
     """
 
     def __init__(self, path: Path, sensor: str) -> None:
@@ -46,17 +46,17 @@ class Labelled:
         self.seconds = sum(lengths)
         self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
         begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
-        # (G,) s, as it is played
+        # (G,) s, as played
         self._start = begin + np.cumsum([0.0, *(length + BETWEEN_RECORDINGS_S for length in lengths)])[:-1]
         self.tape = Tape({}, tuple(self._packets()), (), whole=True)
 
     def scene(self, gestures: Iterable[str]) -> Scene:
-        """The defaults, with the recording's grid and the sensor's own clock."""
+        """The default scene with these gestures, the recording's grid and the sensor's own clock."""
         rows, columns = self._found.frames.shape[1:]
         return Scene(tuple(gestures), (rows, columns), clock="sensor")
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
-        """Hold the events of a replay against the labels."""
+        """Compare the events of a replay with the labels."""
         performed = list(self.performed())
         asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
         _, outcomes = tallied(performed, (line for line in lines if line["type"] in ("gesture", "unknown")))
@@ -81,7 +81,7 @@ class Labelled:
                 yield Packet(round(1e9 * t), SOURCE, form.packet(frame, counter, t))
 
     def performed(self) -> Iterator[Performed]:
-        """What the labels say, in the times of playing."""
+        """The labelled performances, in the times of playing. Raises RecordingError for a session without events."""
         found = self._found
         for g, label in enumerate(found.labels.tolist()):
             if label == SESSION:
@@ -89,7 +89,7 @@ class Labelled:
                     raise RecordingError(
                         f"{self._path}: event_labels: recording {g} is a session whose events are not known"
                     )
-            # What is said of a non-gesture is false whenever it began, so nobody needs to know when that was.
+            # A gesture that is said of a non-gesture is false wherever it lies, so no onset needs to be known for it.
             elif found.onsets is not None or label != NONE:
                 times = found.times_of(g)
                 first = stands_out(found.frames_of(g)) if found.onsets is None else int(found.onsets[g])

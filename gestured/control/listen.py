@@ -1,4 +1,4 @@
-"""`gesturectl listen`: events as they come."""
+"""`gesturectl listen`: print events as they come."""
 
 import argparse
 import sys
@@ -17,7 +17,7 @@ from gestured.control.show import clock, said_when
 from gestured.control.status import listens
 from gestured.core.messages import EVENT_TYPES
 
-TIMES = ("decided", "onset", "offset", "t", "time", "since")  # keys that say when an event was; the first counts
+TIMES = ("decided", "onset", "offset", "t", "time", "since")  # keys for the time of an event, the first found is shown
 
 
 def add(commands: Commands) -> None:
@@ -43,10 +43,10 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print until the count is reached, the daemon ends, or Ctrl-C; exit status 2 for what no daemon sends."""
+    """Print until the count is reached, the daemon ends, or Ctrl-C; returns 2 if the subscription is refused."""
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture, "zones": args.zone}
     left = args.count
-    early: dict[str, dict[str, Any]] = {}  # by sensor, the provisional event that `readable` compares an answer with
+    early: dict[str, dict[str, Any]] = {}  # by sensor: the provisional event before its answer, for `readable`
     told = partial(say, to=sys.stderr)
     try:
         with Subscriber(event_path(args), **wanted, reconnect=args.reconnect, say=told) as subscriber:
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
-    """One event as one line for a person; `before` keeps the last provisional event of each sensor for its answer."""
+    """One event as a line for a person; `before`, which this updates, has each sensor's last provisional event."""
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
     moment = next((event[key] for key in TIMES if event.get(key) is not None), time.time())
@@ -110,20 +110,20 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
 
 
 def went(where: dict[str, Any]) -> str:
-    """Where a contact was, in fractions of the sensor to the right and upward, for a person."""
+    """Where a contact began and ended, in words: x to the right and y upward, as fractions of the sensor."""
     start, end = (f"{where[key]['x']:.2f},{where[key]['y']:.2f}" for key in ("start", "end"))
     zone = f" ({where['zone']})" if where.get("zone") else ""
     return f"from {start}{zone} to {end}" if where["way"] else f"at {start}{zone}"
 
 
 def _greeting(hello: dict[str, Any]) -> str:
-    """Whom it listens to."""
+    """The daemon's hello, in words."""
     names = ", ".join(hello["sensors"]) or "none yet"
     return f"gestured {hello['version']}, model {hello['model']}, sensors: {names}"
 
 
 def _repeat(line: str, event: dict[str, Any]) -> None:
-    """A daemon's line to the letter; written anew where it is more than printable ASCII."""
+    """Print the daemon's line unchanged, or escaped if it is more than printable ASCII."""
     if line.isascii() and line.isprintable():
         say_drawn(line)
     else:

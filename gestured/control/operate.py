@@ -1,4 +1,4 @@
-"""`gesturectl reload`, `recalibrate`, `emit`, `inhibit`, `allow`, `gestures`, `forget`: the daemon is asked, once."""
+"""`gesturectl reload`, `recalibrate`, `emit`, `inhibit`, `allow`, `gestures`, `forget`: one request to the daemon."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -90,7 +90,7 @@ def _add_gates(commands: Commands) -> None:
 
 
 def _asks(parser: Parser, verb: str, *parameters: str) -> None:
-    """Have a subcommand ask the daemon `verb`, with the values of these of its arguments, and print the answer."""
+    """Let a subcommand ask the daemon the `verb`, with those of its arguments that `parameters` names."""
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the daemon's answer")
     parser.set_defaults(run=partial(_ask, verb, parameters))
@@ -106,13 +106,13 @@ def _ask(verb: str, parameters: tuple[str, ...], args: argparse.Namespace) -> in
 
 
 def _reloaded(answer: dict[str, Any]) -> Iterable[str]:
-    waiting = ", ".join(answer.get("awaiting_restart", ()))  # a daemon of before does not say
+    waiting = ", ".join(answer.get("awaiting_restart", ()))  # an older daemon does not tell
     rest = f"; not yet in use, since only a restart changes it: {waiting}" if waiting else ""
     yield f"reloaded; {answer['model']} answers{rest}"
 
 
 def _gates(answer: dict[str, Any]) -> Iterable[str]:
-    """Which sensors are silent now, and by which gates."""
+    """Which sensors are silent now, and which gates are closed."""
     silent = [f"{name} ({', '.join(gates)})" for name, gates in answer["sensors"].items() if gates]
     listen = [name for name, gates in answer["sensors"].items() if not gates]
     parts = [f"{word}: {', '.join(names)}" for word, names in (("silent", silent), ("no gate closed", listen)) if names]
@@ -120,7 +120,7 @@ def _gates(answer: dict[str, Any]) -> Iterable[str]:
 
 
 def _known(answer: dict[str, Any]) -> Iterable[str]:
-    """The model's gestures and one's own, and what is wrong with these."""
+    """The model's gestures, the user's own, and the faults of the user's own."""
     own = answer["own"]
     yield from (f"{name:<32} {answer['model']}" for name in answer["gestures"])
     yield from (f"{name:<32} your own, {count} examples" for name, count in own["gestures"].items())
@@ -129,7 +129,7 @@ def _known(answer: dict[str, Any]) -> Iterable[str]:
     yield from (f"  {said}" for said in own_faults(answer))
 
 
-# Verb -> what the daemon's answer says, in lines for a person.
+# By verb: the daemon's answer in lines for a person.
 WORDS: dict[str, Callable[[dict[str, Any]], Iterable[str]]] = {
     "reload": _reloaded,
     "recalibrate": lambda answer: [f"learning {', '.join(answer['sensors'])} anew; do not touch for a second"],

@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _sockets(args: argparse.Namespace) -> list[Path]:
-    """Where the daemon's names are heard; nowhere where none is named and there is no usual place."""
+    """The event socket on which the daemon tells its answers; none if none is named and there is no default."""
     try:
         return [event_path(args)]
     except SettingsError:

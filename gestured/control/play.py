@@ -1,4 +1,4 @@
-"""What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
+"""What the simulated sensor of `gesturectl` plays: frames of a person who performs gesture after gesture."""
 
 import argparse
 import textwrap
@@ -26,19 +26,19 @@ from gestured.simulator.places import PLACES
 
 KINDS = GESTURES + NON_GESTURES + SEQUENCES
 FIRST = 900  # the person of `--seed 0`; the models learned from 0 to 33
-OTHERS = 0.2  # share of performances that are no gesture, where no kinds are named
-PART_S = 600.0  # what is simulated at a time, at most; between two parts the sensor is off
-PART_COUNTS = 5_000_000  # in a part, which is shorter where frames are large or many: each takes some 50 bytes
-LEAST_S = 10.0  # of a part, in which something is performed
-OFF_S = 3.0
-UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
-BETWEEN_S = (1.0, 2.0)  # between performances
+OTHERS = 0.2  # share of performances that are no gesture, if no kinds are named
+PART_S = 600.0  # the longest part that is simulated at a time
+PART_COUNTS = 5_000_000  # the most counts in a part, since each takes about 50 bytes
+LEAST_S = 10.0  # the shortest part if frames are large or many, since something is to be performed in it
+OFF_S = 3.0  # the sensor is off for so long between two parts
+UNTOUCHED_S = 2.0  # nobody touches the sensor for so long at first, so that the daemon learns the baseline
+BETWEEN_S = (1.0, 2.0)  # the pauses between performances
 
 
 def takes(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
-    """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0.
+    """(start in s from 0, take) of one part after the other, `seconds` in all, or without end if None.
 
-    The same flags give the same frames. With `args.everyday` each is life at that place, of another person.
+    The same flags give the same frames. With `args.everyday` each part is everyday contact of another person there.
     """
     rows, columns = args.grid
     most = max(min(PART_S, PART_COUNTS / (rows * columns * args.rate)), LEAST_S)
@@ -61,7 +61,7 @@ def _sensor(args: argparse.Namespace, of_day: int) -> SimulatedSensor:
 
 
 def performance(args: argparse.Namespace, seconds: float, part: int = 0, first: str | None = None) -> Take:
-    """One part of what a person performs: `first` before all else, where the flags do not name kinds."""
+    """One part of what a person performs; it begins with the kind `first` if the flags name no kinds."""
     person = FIRST + args.seed
     rng = generator(args.seed, 0xC7, person, part)
     at_first = [first] if first else []
@@ -80,7 +80,7 @@ def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The flags of what is played; the help ends with the kinds that there are."""
+    """Add the flags that say what is played, and a list of all kinds at the end of the help."""
     kinds = textwrap.indent(textwrap.fill(", ".join(KINDS), 98), "  ")
     parser.epilog = f"{parser.epilog}\n\nkinds for --kinds:\n{kinds}"
     text = "another person, and another sequence of gestures (default: 0)"

@@ -1,4 +1,4 @@
-"""What to set for the messages that arrive: lines for the configuration file."""
+"""The settings for the messages that arrive, as lines for the configuration file."""
 
 import re
 from collections import Counter
@@ -15,19 +15,17 @@ from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene
 
 TRAJECTORY = "/trajectory"
-STEP_S = 1e-6  # from frame to frame at the least, because some were read at one time
+STEP_S = 1e-6  # the least time from frame to frame, since several may have been read at once
 
 Grid = tuple[int, int]
 DEFAULTS = Scene(("any",), (9, 9))
 
 
 def propose(rows: Sequence[Seen], told: Scene | None = None) -> list[str]:
-    """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again.
+    """Lines for the configuration file, from messages that look like frames: many numbers, or one blob.
 
-    `told` is the scene of the daemon that they reach; without one the defaults count.
-
-    Anybody may have sent them. So there is nothing in these lines but numbers and names that were checked, whose
-    characters mean nothing in TOML.
+    `told` is the scene of the daemon that the messages reach; without one the defaults count. Anybody may have sent
+    the messages, so the lines hold only numbers, and names that were checked to have no meaning in TOML.
     """
     patterns: Counter[str] = Counter()
     likeliest: dict[tuple[str, str], Seen] = {}
@@ -49,7 +47,7 @@ def propose(rows: Sequence[Seen], told: Scene | None = None) -> list[str]:
 
 
 def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
-    """What to set for one sensor; nothing where all fits."""
+    """The lines for one sensor; none if the scene fits."""
     grid, inverted = scene.grid_of(name), scene.setup(name).mounting.invert
     keys = []
     if grid[0] * grid[1] not in seen.taxels():
@@ -68,7 +66,7 @@ def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
 
 
 def _shape(seen: Seen, taxels: int) -> Grid | None:
-    """Rows and columns for so many taxels: those with which a touch looks like a finger's, else the squarest."""
+    """The grid of so many taxels in which a touch looks like a finger's, else the squarest; None if there is none."""
     sides = range(SIDES[0], SIDES[1] + 1)
     shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
     shapes.sort(key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
@@ -77,7 +75,7 @@ def _shape(seen: Seen, taxels: int) -> Grid | None:
     frames = np.array([frame.reshape(-1) for _, frame in seen.matrices(*shapes[0])])
     if len(frames):
         changes = frames - np.median(frames, axis=0)
-        changes -= np.median(changes, axis=1, keepdims=True)  # what all taxels share is no finger
+        changes -= np.median(changes, axis=1, keepdims=True)  # an offset that all taxels share is no finger
         strongest = changes[np.abs(changes).max(axis=1).argmax()]
         alike = {shape: neighbours_alike(strongest, shape[1]) for shape in shapes}
         best = max(shapes, key=alike.__getitem__)
@@ -87,7 +85,7 @@ def _shape(seen: Seen, taxels: int) -> Grid | None:
 
 
 def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:
-    """What the daemon's own front end makes of the frames."""
+    """The habits of a sensor, learned from its kept frames with the daemon's own front end."""
     front_end, habits = FrontEnd(*grid, mounting=Mounting(invert=inverted)), Habits(*grid)
     last = -np.inf
     for t, frame in seen.matrices(*grid):
@@ -102,9 +100,9 @@ def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:
 
 
 def split_address(address: str) -> tuple[str, str] | None:
-    """(pattern, sensor) of an address: the last part but one that can be a name, else the last.
+    """(pattern, sensor) of an address: the sensor is the last part but one that can be a name, else the only one.
 
-    None where there is none, or where a part could be more than a name.
+    None for the address of a trajectory, an address with characters that TOML may interpret, and one without a name.
     """
     if address.endswith(TRAJECTORY) or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address):
         return None

@@ -1,4 +1,4 @@
-"""`gesturectl record`: packets and events of a running daemon into a file."""
+"""`gesturectl record`: write the packets and events of a running daemon into a tape."""
 
 import argparse
 import base64
@@ -21,8 +21,8 @@ from gestured.control.address import add_sockets, connect, finish, finish_after
 from gestured.core.address import Address
 from gestured.record.tape_writer import Writer
 
-FLUSH_S = 1.0  # seconds of a recording that a crash or a power cut costs
-WAITING_LINES = 50_000  # lines; the daemon counts what finds no room
+FLUSH_S = 1.0  # a crash or a power cut costs at most so much of a recording
+WAITING_LINES = 50_000  # the most lines that wait here; the daemon counts those that find no room
 
 
 def add(commands: Commands) -> None:
@@ -46,9 +46,9 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record until the time is over, the file full, the daemon gone, or Ctrl-C; 1 where something was lost."""
+    """Record until the time is over, the file is full, or Ctrl-C; 1 if lines were lost. Raises Unreachable."""
     with connect(args) as control:
-        on_stop(partial(finish, control))  # what the daemon has said by then still comes
+        on_stop(partial(finish, control))  # what the daemon has sent by then is still recorded
         scene = control.ask("tap")
         with Writer(args.file, scene, args.max_mib << 20) as tape:
             say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)
@@ -73,7 +73,7 @@ class Keeper:
     """Puts the lines of a tap into a tape."""
 
     def __init__(self, tape: Writer, scene: Mapping[str, Any]) -> None:
-        """`scene` is what the daemon said of itself."""
+        """`scene` is the daemon's answer to `tap` or `flight`."""
         self.scene = scene
         self._tape, self._epoch_ns = tape, scene["epoch_ns"]
         self._t_ns = time.time_ns()
@@ -94,7 +94,7 @@ class Keeper:
             self.events += 1
 
     def follow(self, control: Control) -> str:
-        """Keep what comes, until the daemon hangs up or the file is full; says why it ended."""
+        """Keep the lines that come until the daemon hangs up or the file is full; returns the reason."""
         lines, flushed = read_ahead(control.lines(), WAITING_LINES), 0.0
         while not self._tape.full:
             with suppress(queue.Empty):

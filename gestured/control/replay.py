@@ -1,4 +1,4 @@
-"""`gesturectl replay`: a recording to a daemon, or through the same code without one."""
+"""`gesturectl replay`: play a recording to a daemon, or through the daemon's code in this process."""
 
 import argparse
 import json
@@ -31,7 +31,7 @@ from gestured.model.shipped import shipped
 from gestured.record.replay import Maker, Replay
 from gestured.record.tape import Tape
 
-DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
+DEFAULT_MODEL = "cnn_lstm"  # for an .npz, which names no model
 BUNDLE = b"#bundle\0"
 Playable = Recorded | Labelled
 
@@ -71,7 +71,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Send it, or play it here; 1 where a comparison finds differences."""
+    """Send the recording, or play it here; returns 1 if a comparison finds differences."""
     _check(args)
     source: Playable = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
     if not source.tape.whole:
@@ -132,7 +132,7 @@ def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
 
 
 def _recorded_models(path: Path, maker: Maker) -> list[Path]:
-    """The shipped models that a tape names, best first: a file is opened because the user names it, not a tape."""
+    """The shipped models that a tape names, best first. RecordingError for others, which only the user may name."""
     names = [name.removesuffix(".onnx") for name in maker.models]
     foreign = [given for given, name in zip(maker.models, names, strict=True) if name not in shipped()]
     if foreign:
@@ -143,10 +143,10 @@ def _recorded_models(path: Path, maker: Maker) -> list[Path]:
 
 
 def _send(tape: Tape, to: Address, speed: float) -> int:
-    """Send each packet, so many times as fast; how many were refused by a closed port. Raises GesturedError.
+    """Send all packets, `speed` times as fast; returns how many a closed port refused. Raises GesturedError.
 
-    Each sender of the tape gets a socket of its own: a sensor belongs to its source. At another pace than its own a
-    packet says itself when it was felt.
+    Each sender of the tape gets a socket of its own, since a sensor belongs to its source. At another speed than 1 a
+    packet is wrapped in a bundle with its recorded time, unless it is a bundle.
     """
     senders: dict[Address, socket.socket] = {}
     unheard, first, start = 0, tape.packets[0].t_ns, time.monotonic()
@@ -169,7 +169,7 @@ def _send(tape: Tape, to: Address, speed: float) -> int:
 def _compare(
     args: argparse.Namespace, source: Playable, lines: Iterable[Line], knew: Knew, *, another: bool = False
 ) -> int:
-    """Print the differences; of `another` model those of names alone, since its confidences are its own, counted."""
+    """Print the differences; 1 if there are any. Of `another` model only names are compared, and counted by pair."""
     compared, skipped, differences = source.compare(lines, knew)
     if another:
         differences = [one for one in differences if one.names[0] != one.names[1]]

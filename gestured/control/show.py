@@ -1,4 +1,4 @@
-"""How the demo looks: a block for each gesture, the summary, and below them the sensor, drawn anew in place."""
+"""The output of the demo: a block for each gesture, the summary, and below them the sensor, redrawn in place."""
 
 import os
 import sys
@@ -17,35 +17,35 @@ VERDICT_COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "misse
 BOLD, DIM = 1, 2
 UP, CLEAR_BELOW = "\x1b[{}F", "\x1b[J"
 HIDE, SHOW = "\x1b[?25l", "\x1b[?25h"  # the cursor
-STOPWATCH_S = 1e6  # times below are no dates
-NOISE = 20.0  # times the sensor's noise that are drawn brightest at least, so that noise stays dark
+STOPWATCH_S = 1e6  # smaller times are seconds on a stopwatch, not since 1970
+NOISE = 20.0  # times the sensor's noise: the least counts that are drawn brightest, so that noise stays dark
 
 
 def paint(text: str, code: int, colour: bool) -> str:
-    """The text in an ANSI style, or as it is."""
+    """The text in an ANSI style, or unchanged without `colour`."""
     return f"\x1b[{code}m{text}\x1b[0m" if colour else text
 
 
 def name(performed: Performed | None) -> str:
-    """What a person would call what was performed."""
+    """The name of a performance, for a person."""
     if performed is None:
         return "nothing"
     return f"no gesture ({performed.kind.replace('_', ' ')})" if performed.label == NONE else performed.label
 
 
 def clock(t: float) -> str:
-    """When something was, for a person: the time of day of a date, else the seconds on a stopwatch."""
+    """A time for a person: the time of day of a date, else seconds on a stopwatch."""
     return datetime.fromtimestamp(t).strftime("%H:%M:%S.%f")[:-3] if t >= STOPWATCH_S else f"{t:.3f} s"
 
 
 def said_when(decided: float, offset: float) -> str:
-    """When something was `decided`, in words; `offset` is the last touched frame, both in s."""
+    """The time between `decided` and `offset`, the last touched frame (both in s), in words."""
     ms = round(1000 * (offset - decided))
     return f"{abs(ms)} ms {'before' if ms >= 0 else 'after'} the finger left"
 
 
 def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
-    """Picture and words of one outcome, six lines with the empty one after it."""
+    """Picture and words of one outcome: six lines, of which the last is empty."""
     event, performed = outcome.event, outcome.performed
     if event:
         by = f"  by {event['model']}, degraded" if event["degraded"] else ""
@@ -107,26 +107,26 @@ def in_words(figures: Mapping[str, Any], colour: bool) -> str:
 
 
 def in_colour() -> bool:
-    """Whether the terminal shows colours, and its user wants them."""
+    """Whether the output is a terminal that shows colours, and the user wants them (NO_COLOR is not set)."""
     plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
     return sys.stdout.isatty() and not plain
 
 
 class Screen:
-    """The lines below; a context manager, which gives the cursor back."""
+    """The lines at the bottom of a terminal that are redrawn in place; a context manager that hides the cursor."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
 
     def draw(self, lines: list[str]) -> None:
-        """Put these in the place of the last ones."""
+        """Put these lines in the place of the last ones."""
         if lines == self._lines:
             return
         say_drawn(self._back() + "\n".join(lines))
         self._lines = lines
 
     def above(self, text: str) -> None:
-        """Say something that stays, above them."""
+        """Print a text that stays, above the redrawn lines."""
         say_drawn(self._back() + text)
         lines, self._lines = self._lines, []
         if lines:
@@ -144,14 +144,14 @@ class Screen:
 
 
 class Felt:
-    """One sensor as it is felt: what the control verb `view` answers, in lines."""
+    """One sensor in lines for a terminal, from the daemon's views of it."""
 
     def __init__(self, colour: bool) -> None:
         self._colour = colour
-        self._full = 0.0  # counts that are drawn brightest: the most that was seen
+        self._full = 0.0  # counts that are drawn brightest: the most so far
 
     def lines(self, view: dict[str, Any]) -> list[str]:
-        """The picture with its words."""
+        """A view as a picture with words beside it."""
         head = shown(f"{view['sensor']}  {view['state']}")
         if view["values"] is None:
             return [head, "the idle sensor is being learned:", "leave it untouched for a second"]

@@ -1,4 +1,4 @@
-"""What was seen of OSC packets; bounded whatever arrives, since anybody may have sent them."""
+"""The OSC messages that were seen; their memory is bounded, since anybody may have sent them."""
 
 import re
 from collections import Counter
@@ -12,15 +12,15 @@ from gestured.core import osc
 from gestured.core.errors import ProtocolError
 from gestured.core.osc import Message
 
-MOST_ADDRESSES = 256  # addresses; what comes after that is counted together
+MOST_ADDRESSES = 256  # the most pairs of address and types; messages of further ones are counted together
 LEAST_TAXELS = 4  # 2 x 2
-KEPT_BYTES = 64 << 20  # of frames, which are looked at in the end
+KEPT_BYTES = 64 << 20  # the most bytes of frames that are kept, for a proposal
 ARRAY = re.compile(rb"\0,[a-z]*\[")  # type tags of an OSC array
 
 
 @dataclass
 class Seen:
-    """What came to one address with one kind of arguments."""
+    """The messages that came to one address with one list of types."""
 
     address: str
     types: str
@@ -28,22 +28,22 @@ class Seen:
     first: float = 0.0  # s
     last: float = 0.0
     sources: set[str] = field(default_factory=set)
-    frames: list[tuple[float, NDArray[np.generic] | bytes]] = field(default_factory=list)  # s, what may be a frame
-    integer: int | None = None  # the first one of the last message
-    steps: int = 0  # by which it grew by one from message to message
+    frames: list[tuple[float, NDArray[np.generic] | bytes]] = field(default_factory=list)  # (s, what may be a frame)
+    integer: int | None = None  # the first integer of the last message
+    steps: int = 0  # how often that integer grew by one from message to message
 
     @property
     def rate_hz(self) -> float:
-        """Messages a second, 0 for a single one."""
+        """Messages a second; 0 for a single message."""
         return (self.count - 1) / (self.last - self.first) if self.last > self.first else 0.0
 
     @property
     def counted(self) -> bool:
-        """Whether the first of many integers counts the frames."""
+        """Whether the first of a message's integers counts the frames."""
         return self.types.startswith("i*") and self.count > 1 and self.steps >= (self.count - 1) / 2
 
     def taxels(self) -> tuple[int, ...]:
-        """How many taxels a message may hold, the likeliest number first; () where it is no frame."""
+        """How many taxels a message may hold, the likeliest number first; () if it is no frame."""
         if match := re.fullmatch(r"(?:i )?b\[(\d+)\]", self.types):  # of uint16, float32 or uint8
             size = int(match[1])
             return tuple(size // n for n in (2, 4, 1) if size % n == 0 and size // n >= LEAST_TAXELS)
@@ -57,7 +57,7 @@ class Seen:
         return ()
 
     def matrices(self, rows: int, columns: int) -> list[tuple[float, NDArray[np.float64]]]:
-        """(s, (R, C) counts) of the frames that were kept and have that size."""
+        """(s, (R, C) counts) of each kept frame of that size."""
         size = rows * columns
         found = []
         for t, what in self.frames:
@@ -70,7 +70,7 @@ class Seen:
 
 
 class Sight:
-    """All that was seen."""
+    """All messages that were seen, by address and types, and the packets that could not be decoded."""
 
     def __init__(self) -> None:
         self.packets = 0
@@ -80,7 +80,7 @@ class Sight:
         self._kept = 0  # bytes of frames
 
     def rows(self) -> list[Seen]:
-        """Each address with each kind of arguments, the most frequent first."""
+        """Each pair of address and types, the most frequent first."""
         return sorted(self.seen.values(), key=lambda seen: -seen.count)
 
     def packet(self, t: float, source: str, packet: bytes) -> None:
@@ -117,7 +117,7 @@ class Sight:
 
 
 def short_types(message: Message) -> str:
-    """Type tags with runs written as a number, such as `i f*81`; a blob with its size, as `b[162]`."""
+    """A message's type tags, with the length of runs as in `i f*81`, and the size of blobs as in `b[162]`."""
     words = []
     sizes = iter([len(a) for a in message.args if isinstance(a, bytes)])
     for tag, run_of in groupby(message.types):

@@ -1,4 +1,4 @@
-"""`gesturectl simulate`: a simulated sensor, and a person who touches it."""
+"""`gesturectl simulate`: send the frames of a simulated sensor that a simulated person touches."""
 
 import argparse
 import sys
@@ -52,21 +52,21 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
+    """Send until the time is over, or Ctrl-C. Raises GesturedError if nobody listens from the first packet on."""
     if args.everyday and (args.kinds or args.speed):
         raise GesturedError("--everyday: expected neither --kinds nor --speed, a day has its own")
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     parts = iter(read_ahead(takes(args, args.seconds), 1).get, None)
-    first = next(parts)  # the sensor's time begins once it is made; each further one is made while one is sent
+    first = next(parts)  # before `Sensor` starts its clock; each further part is simulated while another is sent
     sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     try:
         for start, take in chain([first], parts):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()
-        if 0 < sensor.unheard < sensor.sent - 1:  # a daemon that was there before has gone, or was started again
+        if 0 < sensor.unheard < sensor.sent - 1:  # the daemon ended, or was restarted
             lost = f"{sensor.unheard} of {sensor.sent} packets"
             say(f"nobody listened on {args.to} for {lost}", to=sys.stderr)
     return 0
@@ -79,10 +79,10 @@ def _telling(
     sensor: Sensor,
     as_json: bool,
 ) -> Iterator[tuple[int, Frame]]:
-    """The frames, and what was performed printed as each ends."""
-    left = sorted(events, key=lambda event: event.offset_s)  # what rests lasts longer than what happens beside it
+    """The frames unchanged; each performance is printed when it ends. Raises GesturedError if nobody listens."""
+    left = sorted(events, key=lambda event: event.offset_s)  # acts overlap: what rests outlasts others
     for counter, frame in frames:
-        if sensor.unheard and sensor.unheard >= sensor.sent - 1:  # of the last packet nobody can know
+        if sensor.unheard and sensor.unheard >= sensor.sent - 1:  # a refusal is known at the next packet only
             raise GesturedError(f"nobody listens on {sensor.to}: start gestured, or name its address with --to")
         while left and start + left[0].offset_s < frame.t:
             event = left.pop(0)

@@ -1,4 +1,4 @@
-"""`gesturectl sniff`: which OSC messages arrive, and what to set for them."""
+"""`gesturectl sniff`: print which OSC messages arrive, and what to set for them."""
 
 import argparse
 import base64
@@ -25,8 +25,8 @@ from gestured.core.errors import GesturedError
 from gestured.core.scene import Scene
 from gestured.record.replay import maker
 
-SHOWN_CHARACTERS = 80  # characters of an address or of type tags
-NOT_TAKEN = {"d": "doubles", "h": "64-bit integers"}  # by type tag
+SHOWN_CHARACTERS = 80  # the most characters of an address, or of type tags, that are printed
+NOT_TAKEN = {"d": "doubles", "h": "64-bit integers"}  # by type tag: numbers that the daemon does not take
 
 
 def add(commands: Commands) -> None:
@@ -48,7 +48,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look, and say what was there; exit status 1 where nothing came that looks like a frame."""
+    """Listen, then print what arrived and what to set; returns 1 if no message looks like a frame."""
     sight, told = Sight(), None
     try:
         if args.listen:
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
                 sight.packet(t, source, packet)
         else:
             with connect(args) as control:
-                on_stop(partial(finish, control))  # what the daemon has said by then still comes
+                on_stop(partial(finish, control))  # what the daemon has sent by then is still seen
                 told = overhear(control, args.seconds, sight)
     except KeyboardInterrupt:
         pass
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def overhear(control: Control, seconds: float, sight: Sight) -> Scene:
-    """Have `sight` see for so long what reaches the daemon; what is set there. Raises GesturedError."""
+    """Give `sight` the packets that reach the daemon for so long; returns the daemon's scene. Raises GesturedError."""
     scene = maker(control.ask("tap")).scene
     finish_after(control, seconds)
     with control.reading():
@@ -85,7 +85,7 @@ def overhear(control: Control, seconds: float, sight: Sight) -> Scene:
 
 
 def lines(sight: Sight, proposed: list[str]) -> Iterator[str]:
-    """What was seen, for a person, and what to set."""
+    """What was seen and what to set, in lines for a person."""
     yield f"{sight.packets} packets"
     if not sight.packets:
         yield "nothing arrives: is the sensor powered, does it send to this address, does a firewall keep it out?"
@@ -106,7 +106,7 @@ def lines(sight: Sight, proposed: list[str]) -> Iterator[str]:
 
 
 def _remarks(seen: Seen) -> Iterator[str]:
-    """What may be wrong with what came to one address."""
+    """What may be wrong with the messages to one address, in lines for a person."""
     address = shown(seen.address, SHOWN_CHARACTERS)
     if (found := re.search(r"([dh])\*\d+", seen.types)) is not None:
         yield f"  {address}: {NOT_TAKEN[found[1]]} are not taken: send f"

@@ -1,4 +1,4 @@
-"""`gesturectl status`: how the daemon is, on one screen."""
+"""`gesturectl status`: print the state of the daemon and its sensors on one screen."""
 
 import argparse
 import os
@@ -24,7 +24,7 @@ CLEAR = "\x1b[2J\x1b[H"
 REFRESH_S = 1.0
 SHIFT_NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
 RATES = f"{RANGE_HZ[0]:.0f} to {RANGE_HZ[1]:.0f} Hz"
-SENSOR_LINES = 12  # lines; what is more is counted
+SENSOR_LINES = 12  # the most sensors that get a line each; further ones are counted
 
 
 def add(commands: Commands) -> None:
@@ -45,7 +45,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print once, or again and again."""
+    """Print the state once, or every REFRESH_S with `--watch`; returns 1 if a daemon is not ready."""
     with nullcontext() if args.all else connect(args) as control:
         while True:
             status = every(args) if control is None else one(args, control)
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def one(args: argparse.Namespace, control: Control) -> int:
-    """Print how one daemon is; 1 where it is not ready."""
+    """Print the state of one daemon; returns 1 if it is not ready."""
     status = control.ask("status")
     with control.reading():
         lines, ready = [] if args.json else list(screen(status)), status["ready"]["ready"]
@@ -65,8 +65,8 @@ def one(args: argparse.Namespace, control: Control) -> int:
 
 
 def every(args: argparse.Namespace) -> int:
-    """Print a line for each daemon; 1 where one is not ready, does not answer, or there is none."""
-    installed = control_beside(SYSTEM)  # which has a network of its own, and so is not in the kernel's table of ours
+    """Print a line for each daemon; returns 1 if one is not ready or is silent. Raises Unreachable if none runs."""
+    installed = control_beside(SYSTEM)  # in a network of its own (systemd), so `running` does not find that daemon
     paths = sorted({*running(), *([installed] if os.path.exists(installed) else [])})
     if not paths:
         raise Unreachable("no daemon runs on this machine")
@@ -90,13 +90,13 @@ def every(args: argparse.Namespace) -> int:
 
 
 def _clear(args: argparse.Namespace) -> None:
-    """Have what is watched begin at the top of a terminal."""
+    """Clear the terminal before the state is printed again."""
     if args.watch and not args.json and sys.stdout.isatty():
         say_drawn(CLEAR, end="")
 
 
 def summary(path: Path, status: dict[str, Any]) -> str:
-    """How one daemon is, in a line."""
+    """The state of one daemon in a line."""
     word = status["state"] if status["ready"]["ready"] else "not ready"
     sensors = status["sensors"].values()
     heard = [sensor for sensor in sensors if sensor["state"] not in SILENT]
@@ -108,7 +108,7 @@ def summary(path: Path, status: dict[str, Any]) -> str:
 
 
 def screen(status: dict[str, Any]) -> Iterator[str]:
-    """The lines for a person."""
+    """The state of one daemon in lines for a person."""
     model, out, ready = status["model"], status["output"], status["ready"]
     word = status["state"] if ready["ready"] else f"not ready: {ready['reason']}"
     yield f"gestured {status['version']}, {word}, up {span(status['uptime_s'])}, pid {status['pid']}"
@@ -123,7 +123,7 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     answers = status["answers"]
     total = sum(answers["gestures"].values())
     cancelled = ", ".join(f"{count} {reason}" for reason, count in answers["cancelled"].items()) or "none"
-    suppressed = sum(answers.get("suppressed", {}).values())  # a daemon of before has none
+    suppressed = sum(answers.get("suppressed", {}).values())  # an older daemon has none
     silenced = f", {suppressed} while silent or not armed" if suppressed else ""
     yield f"answers: {total} gestures, {answers['unknown']} unknown{silenced}; cancelled: {cancelled}"
     yield from _recent(status["recent"])
@@ -140,8 +140,8 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
 
 
 def own_faults(status: dict[str, Any]) -> list[str]:
-    """What keeps the user's own gestures from being known, or told apart: a sentence each."""
-    own = status.get("own")  # a daemon of before has none
+    """Why the user's own gestures are not recognised, or not told apart: a sentence for each reason."""
+    own = status.get("own")  # an older daemon has none
     if own is None:
         return []
     return [said for said in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]) if said]
@@ -166,7 +166,7 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
 
 
 def listens(told: dict[str, Any]) -> str:
-    """Whether a sensor listens, from the keys that a `gate` event and the status have."""
+    """Whether a sensor listens, in words, from a `gate` event or from the sensor's status."""
     if told.get("closed"):
         return f"silent, gates closed: {', '.join(told['closed'])}"
     return "armed" if told.get("armed") else "listens" if told.get("armed") is None else "not armed"
@@ -193,6 +193,6 @@ def _shift(shift: dict[str, Any]) -> str:
 
 
 def span(seconds: float) -> str:
-    """A time in words."""
+    """A duration in words."""
     hours, rest = divmod(int(seconds), 3600)
     return f"{hours} h {rest // 60} min" if hours else f"{rest // 60} min {rest % 60} s"

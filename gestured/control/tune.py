@@ -1,4 +1,4 @@
-"""`gesturectl tune`: what every threshold costs on somebody's own recordings, and which one that suggests."""
+"""`gesturectl tune`: print what each threshold costs on the user's own recordings, and propose one."""
 
 import argparse
 import dataclasses
@@ -24,7 +24,7 @@ from gestured.model.opening import open_model
 from gestured.record.replay import Replay
 
 BAR = 36  # characters
-SHORTEST_S = 60.0  # of recordings without gestures: in less, nothing can be told
+SHORTEST_S = 60.0  # the shortest recordings without gestures from which a threshold can be judged
 
 
 def add(commands: Commands) -> None:
@@ -50,7 +50,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play all, count, propose."""
+    """Play all recordings, count, and print figures and proposal. Raises RecordingError if they are too short."""
     model = open_model(args.model)
     played = Played()
     for path in args.recordings:
@@ -67,13 +67,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def play(path: Path, model: Model, played: Played) -> None:
-    """Add what a file holds to what was `played`. Raises RecordingError."""
+    """Play a file, and add what it holds to `played`. Raises RecordingError."""
     labelled = path.suffix == ".npz"
     source: Labelled | Recorded = Labelled(path, "recording") if labelled else Recorded(path)
     scene = source.scene(model.gestures) if isinstance(source, Labelled) else source.maker.scene
     if not source.tape.packets:
         raise RecordingError(f"{path}: holds no packets")
-    # What was said is to depend on thresholds alone: a gate, or a gesture that arms, would silence contacts for all.
+    # Only thresholds may decide what is published: gates and arming would silence contacts at every threshold.
     scene = dataclasses.replace(
         scene,
         gestures=model.gestures,
@@ -89,7 +89,7 @@ def play(path: Path, model: Model, played: Played) -> None:
         played.seconds += source.seconds
         played.add([*source.performed()], events, partial(replay.knew, "recording"))
     else:
-        # A sensor that sends only while it is touched is there in its pauses, but nobody says so for a whole night.
+        # A sensor that sends only while it is touched counts as present in pauses, but in none longer than ABSENT_S.
         steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))
         played.seconds += sum(min(step / 1e9, ABSENT_S) for step in steps)
         played.add([], events)
@@ -114,7 +114,7 @@ def _row(played: Played, counts: Counts) -> dict[str, Any]:
 
 
 def _words(tuned: Tuned) -> Iterator[str]:
-    """The table, a picture of it, and the settings."""
+    """The table with bars, and the proposed settings, in lines for a person."""
     played, best, name = tuned.played, tuned.best, tuned.model.name
     total, hours = max(played.meant, 1e-9), max(played.hours, 1e-9)
     yield f"{len(played.performed)} gestures, {played.others} non-gestures, {60 * hours:.1f} minutes; {name}"

@@ -1,6 +1,6 @@
-"""Thresholds, by what they cost on recordings: gestures lost and wrong, and events that nobody meant.
+"""Thresholds and what they cost on recordings: gestures missed and wrong, and events that nobody meant.
 
-A recording is played once; at every threshold it is only counted again.
+A recording is played once; its answers are then counted again for each threshold.
 """
 
 import math
@@ -17,31 +17,31 @@ from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed, Said, owners, verdicts
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
-CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # that may be proposed
-ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
-EACH = 3.0  # gestures that are missed, to which a wrong or a false one is equal
-GESTURES_AN_HOUR = 20  # assumed where nobody performed any, to hold what a model misses against what is false
-DOUBT = 0.05  # probability that hours show so few false ones although more come
+CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # the thresholds that may be proposed
+ENOUGH = 20  # the fewest performances of a gesture for which a threshold of its own is proposed
+EACH = 3.0  # a wrong or false gesture costs as much as so many missed ones
+GESTURES_AN_HOUR = 20  # assumed if none were performed, to compare a model's missed gestures with the false ones
+DOUBT = 0.05  # probability of so few false gestures in the hours played although more than the budget come
 
 
 @dataclass
 class Played:
-    """All that was performed, and all that was said, in their order."""
+    """All that was performed in the recordings, and all that a model said of it, in order."""
 
     performed: list[Performed] = field(default_factory=list)  # gestures alone
-    others: int = 0  # non-gestures
+    others: int = 0  # number of non-gestures performed
     said: list[Said] = field(default_factory=list)
-    skipped: int = 0  # performed before the sensor was known
+    skipped: int = 0  # number of performances that began before the sensor was known
     seconds: float = 0.0
 
     @property
     def hours(self) -> float:
-        """How long all recordings take."""
+        """The length of all recordings."""
         return self.seconds / 3600
 
     @property
     def meant(self) -> float:
-        """How many gestures were performed; where none were, how many are assumed."""
+        """How many gestures were performed, or are assumed if none were."""
         return len(self.performed) or GESTURES_AN_HOUR * self.hours
 
     def add(
@@ -50,9 +50,9 @@ class Played:
         events: Sequence[Mapping[str, Any]],
         knew: Callable[[float], bool] = lambda t: True,
     ) -> None:
-        """What one recording holds, and its events in their order, published from no confidence at all.
+        """Add the performances of one recording, and its gesture events at threshold 0, in order.
 
-        What began before the sensor was known, as `knew` says of a time (s), is left out with all that was said of it.
+        A performance that began before the sensor was known (`knew` at a time in s) is left out with its events.
         """
         spans = [(float(event["onset"]), float(event["offset"])) for event in events]
         used = [one for one in performed if knew(one.onset)]
@@ -67,27 +67,27 @@ class Played:
 
 @dataclass(frozen=True)
 class Counts:
-    """What thresholds cost."""
+    """The numbers of gestures that are right, wrong, missed and false with some thresholds."""
 
-    threshold: float | None  # of all gestures alike; None where each has its own
+    threshold: float | None  # the one of all gestures; None if each has its own
     right: int
     wrong: int
-    missed: float | None  # None where nobody knows
+    missed: float | None  # None if not known
     false: int
-    unmeant: int  # of the false ones, those that were not said of a non-gesture which was performed
+    unmeant: int  # of the false ones, those that were not said of a performed non-gesture
 
     @property
     def cost(self) -> float:
-        """In gestures that are missed; a wrong or a false one costs as much as EACH of them."""
+        """The cost in missed gestures; a wrong or false one costs as much as EACH of these."""
         return (self.missed or 0.0) + EACH * (self.wrong + self.false)
 
 
 def counted(played: Played, least: float | Mapping[str, float], gesture: str | None = None) -> Counts:
-    """Count the answers that are right, wrong, missed or false at a threshold, or at one for each gesture.
+    """Count the answers at the threshold `least`, or at one for each gesture.
 
-    With `gesture`, performances of that gesture can be right or missed, and answers that name it wrong or false.
+    With `gesture`, performances of that gesture are right or missed, and answers that name it may be wrong or false.
     """
-    answered: dict[int, bool] = {}  # performed -> whether rightly
+    answered: dict[int, bool] = {}  # by id of a performance: whether its answer is right
     wrong = false = provoked = 0
     for said, found in verdicts(played.said, least):
         if found != "false":
@@ -102,23 +102,23 @@ def counted(played: Played, least: float | Mapping[str, float], gesture: str | N
 
 
 def estimated(played: Played, least: float | Mapping[str, float], share: float | None) -> Counts:
-    """What `counted` counts; where nobody performed a gesture, the share of them that is missed, None if unknown."""
+    """The counts of `counted`; if no gesture was performed, the missed are estimated from a share (None: unknown)."""
     found = counted(played, least)
     return found if played.performed else replace(found, missed=None if share is None else share * played.meant)
 
 
 def share_missed(curve: Curve, threshold: float) -> float | None:
-    """What a model misses at a threshold of all gestures alike, by its curve; None for one that has none."""
+    """The share of gestures that a model misses at one threshold for all, by its curve; None without a curve."""
     if not curve:
         return None
-    thresholds, missed, _ = zip(*curve, (1.0, 1.0, 0.0), strict=True)  # nobody is surer than sure
+    thresholds, missed, _ = zip(*curve, (1.0, 1.0, 0.0), strict=True)  # at threshold 1 all are missed
     return float(np.interp(threshold, thresholds, missed))
 
 
 def allowed(per_hour: float, hours: float) -> int | None:
-    """The most false gestures in so many hours that show, at 95 %, that no more than `per_hour` come in an hour.
+    """The most false gestures in so many hours that show, at 95 %, a rate of at most `per_hour`; None if even 0 do not.
 
-    Events that come by chance (Poisson): none in three times as long as one may take. None where no count shows it.
+    False gestures are taken to be Poisson distributed: none in 3 / `per_hour` hours shows the rate.
     """
     mean, chance, count = per_hour * hours, 0.0, -1
     if mean == 0:
@@ -131,9 +131,9 @@ def allowed(per_hour: float, hours: float) -> int | None:
 
 
 def proposed(rows: Sequence[Counts], now: float, most: int | None = None) -> Counts | None:
-    """The row that costs least, of those with at most `most` unmeant; of equal ones that nearest to what is set `now`.
+    """The cheapest row of those with at most `most` unmeant; of equally cheap ones, the one nearest to `now`.
 
-    Where nobody knows what is missed it is the first with so few (their thresholds rise). None where there is none.
+    If the number of missed gestures is not known, it is the first row with so few, or None without `most`.
     """
     few = [row for row in rows if most is None or row.unmeant <= most]
     if any(row.missed is None for row in few):
@@ -142,9 +142,9 @@ def proposed(rows: Sequence[Counts], now: float, most: int | None = None) -> Cou
 
 
 def for_each(played: Played, now: float, *, no_more: bool = False) -> dict[str, Counts]:
-    """What is proposed for single gestures: those that were performed often enough.
+    """By gesture: what is proposed for it alone, if it was performed at least ENOUGH times.
 
-    With `no_more`, none of them says more that nobody meant than at the threshold that is set `now`.
+    With `no_more`, no gesture gets more unmeant answers than at the threshold `now`.
     """
     performed = Counter(one.label for one in played.performed)
     found = {}
@@ -158,31 +158,31 @@ def for_each(played: Played, now: float, *, no_more: bool = False) -> dict[str, 
 
 @dataclass(frozen=True)
 class Tuned:
-    """All that is told."""
+    """The figures of all thresholds, and the proposal."""
 
     model: Model
     played: Played
-    rows: Sequence[Counts]  # a threshold each
-    points: Mapping[str, Counts]  # by strictness, where the model has operating points
+    rows: Sequence[Counts]  # one for each of THRESHOLDS
+    points: Mapping[str, Counts]  # by strictness, if the model has operating points
     now: Counts  # at the model's usual strictness, or its own threshold
-    budget: float | None  # false ones an hour
-    most: int | None  # false ones in all, which show that
-    best: Counts | None  # what is proposed; its threshold is of the gestures that are not in `each`
-    each: Mapping[str, Counts]  # what is proposed for single gestures
+    budget: float | None  # the most false gestures an hour
+    most: int | None  # the most false gestures in all that show that the budget is kept
+    best: Counts | None  # what is proposed; its threshold is that of the gestures that are not in `each`
+    each: Mapping[str, Counts]  # by gesture: what is proposed for it alone
 
     @property
     def strictness(self) -> str | None:
-        """The strictness that is proposed in place of thresholds."""
+        """The strictness that is proposed in place of thresholds, if any."""
         return next((name for name, row in self.points.items() if row is self.best), None)
 
     @property
     def missed_by(self) -> str | None:
-        """Who says what is missed: the recordings, the model, or nobody."""
+        """What the missed gestures are known from: "recordings", "model" or None."""
         return "recordings" if self.played.performed else "model" if self.points else None
 
 
 def tune(model: Model, played: Played, budget: float | None) -> Tuned:
-    """Count what thresholds cost, and propose. Raises GesturedError for a budget that cannot be shown, or kept."""
+    """Count what thresholds cost, and propose. Raises GesturedError if the budget cannot be shown or kept."""
     most = None if budget is None else allowed(budget, played.hours)
     if budget is not None and most is None:
         raise GesturedError(
@@ -193,7 +193,7 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
     stored = (model.points or {}).items()
     points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored}
     usual = points.get(USUAL)
-    # Where nobody performed anything, what says more than usual must be shown to be false no more often.
+    # Without performed gestures, a row that misses fewer than usual must be shown to have no more false ones.
     unasked = usual is not None and budget is None and not played.performed
     few = allowed(model.points[USUAL].false_per_hour, played.hours) if model.points and unasked else None
 
@@ -209,7 +209,7 @@ def tune(model: Model, played: Played, budget: float | None) -> Tuned:
             best = replace(together, threshold=best.threshold)
         else:
             single = {}
-    rows = (usual, *points.values(), best)  # of those that cost the same the first is taken
+    rows = (usual, *points.values(), best)  # of those that cost the same, `proposed` takes the first
     best = proposed([row for row in rows if row is not None and may_be(row)], model.threshold, most)
     if best is None and most is not None:
         left = {name: counted(played, CANDIDATES[-1], name).unmeant for name in model.gestures}

@@ -13,7 +13,7 @@ from gestured.control.address import add_sockets, connect, control_path
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-NICE = 10  # steps: a picture for the eye waits for the daemon, and for whoever sends to it
+NICE = 10  # lowers the priority, since the daemon and programs that send to it come first
 DEFAULT = Address("127.0.0.1", 9109)
 
 
@@ -50,9 +50,9 @@ def run(args: argparse.Namespace) -> int:
     stop_as_by_ctrl_c()
     if not is_loopback(args.listen.host):
         raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
-    connect(args).close()  # who has no daemon, is told so at once
+    connect(args).close()  # raises at once if no daemon runs
     try:
-        args.folder.mkdir(parents=True, exist_ok=True)  # not once something was wrong, and is to be kept
+        args.folder.mkdir(parents=True, exist_ok=True)  # a fault is shown now, not when a recording is flagged
     except OSError as error:
         raise GesturedError(f"--folder {args.folder}: cannot be made: {error.strerror}") from error
     os.nice(NICE)

@@ -1,4 +1,4 @@
-"""What the page of `gesturectl view` asks for: the stream of a sensor, a flag, a sensor learned anew or silenced."""
+"""The server of the page of `gesturectl view`: streams of sensors, flags, and requests to the daemon."""
 
 import threading
 from collections.abc import Mapping
@@ -13,12 +13,12 @@ from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError
 
 PAGE = Path(__file__).with_name("page")
-TABS = 5  # that look at a time: a browser makes six connections to a server, and needs one for what its tabs ask
-VERBS = {"/silence": "inhibit", "/hear": "allow", "/recalibrate": "recalibrate"}  # path -> what the daemon is asked
+TABS = 5  # the most streams at a time: a browser makes six connections to a server, and needs one for other requests
+VERBS = {"/silence": "inhibit", "/hear": "allow", "/recalibrate": "recalibrate"}  # by path: the verb of the daemon
 
 
 class ViewServer(Server):
-    """Serves on a loopback address; a context manager. Raises GesturedError where it cannot be had."""
+    """Serves the page on a loopback address; a context manager. Raises GesturedError if the address cannot be bound."""
 
     def __init__(self, listen: Address, source: Source, door: Door) -> None:
         super().__init__(listen, door, PAGE, _Handler)
@@ -32,7 +32,7 @@ class _Handler(Handler):
     server: ViewServer
 
     def look(self, query: Mapping[str, str]) -> None:
-        """Stream the state, one sensor's frames, and the events."""
+        """Stream the daemon's state, one sensor's frames, and the events."""
         sensor = query.get("sensor", "")
         if sensor and not is_sensor(sensor):
             self.refuse(HTTPStatus.BAD_REQUEST, "sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -")
@@ -48,7 +48,7 @@ class _Handler(Handler):
                 self.server.tabs.release()
 
     def act(self, what: dict[str, Any]) -> Said:
-        """Flag, recalibrate, silence or let be heard."""
+        """Flag the last answers, or recalibrate, silence or hear a sensor."""
         if not all(isinstance(value, str) for value in what.values()):
             return HTTPStatus.BAD_REQUEST, {"error": "expected a JSON object of texts"}
         source, verb = self.server.source, VERBS.get(self.path)

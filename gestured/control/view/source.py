@@ -1,4 +1,4 @@
-"""What the page shows, as the daemon tells who looks on: its state each second, frames of what is looked at, events."""
+"""The source of the page's data: the daemon's state each second, frames of the sensors looked at, and events."""
 
 import threading
 from collections.abc import Iterator
@@ -16,22 +16,22 @@ from gestured.control.flag import flag, flag_path
 from gestured.control.operate import WORDS
 from gestured.core.errors import GesturedError
 
-GATE = "view"  # the page's own
-AGAIN_S = 0.5  # before a daemon that has gone is asked again
-SILENT_S = 4.0  # for an answer, and between lines: a daemon tells its state each second
+GATE = "view"  # the gate that the page closes and opens
+AGAIN_S = 0.5  # the pause before the next connection to a daemon that has gone
+SILENT_S = 4.0  # the longest wait for an answer or the next line, since a daemon tells its state each second
 
-Looked = tuple[list[str], bool] | None  # sensors, and whether with their counts as they were sent; None: nobody looks
+Looked = tuple[list[str], bool] | None  # sensors, and whether their counts as sent are wanted; None: nobody looks
 
 
 class Looker(Outbox):
-    """What waits for a browser that looks at a sensor, and perhaps at its counts as they were sent."""
+    """The outbox of a browser that looks at a sensor; with `raw` it also gets the counts as they were sent."""
 
     def __init__(self, sensor: str, raw: bool) -> None:
         super().__init__()
         self.sensor, self.raw = sensor, raw
 
     def touch(self, told: dict[str, Any]) -> None:
-        """Where a finger is; a move that waits takes up the next one, so that moves displace nothing."""
+        """Put a touch event. Waiting moves of one finger are merged, so that they displace no other event."""
         with self._changed:
             for _, waits in takewhile(lambda one: one[1].get("phase") == "move", reversed(self._rest)):
                 if (waits["id"], waits["touch"]) == (told["id"], told["touch"]):
@@ -41,22 +41,22 @@ class Looker(Outbox):
 
 
 class Source:
-    """One daemon, for any number of browsers. It is asked for nothing as long as nobody looks."""
+    """One daemon, for any number of browsers. Nothing is requested from the daemon while nobody looks."""
 
     def __init__(self, control: Path, folder: Path) -> None:
-        """What is flagged is put into `folder`."""
+        """`control`: path of the control socket; `folder`: for flagged recordings."""
         self._control, self._folder = control, folder
         self._open: list[Looker] = []
         self._changed = threading.Condition()
         self._closed = threading.Event()
-        self._state: dict[str, Any] = {}  # the daemon's, as the page is told it
+        self._state: dict[str, Any] = {}  # the daemon's state as the page gets it
         self._looking: Control | None = None  # the connection over which the daemon streams
         self._looked_at: Looked = None
         self._latest: dict[str, dict[str, Any]] = {}  # the last view of each sensor that is looked at
         threading.Thread(target=self._look_again_and_again, daemon=True).start()
 
     def join(self, outbox: Looker) -> None:
-        """A browser begins to look: fill its outbox from now on."""
+        """Fill the outbox of a browser from now on."""
         if self._state:
             outbox.put("sensors", self._state)
         if outbox.sensor in self._latest:
@@ -66,13 +66,13 @@ class Source:
             self._look_anew()
 
     def leave(self, outbox: Looker) -> None:
-        """And looks no more."""
+        """Fill the outbox of a browser no more."""
         with self._changed:
             self._open.remove(outbox)
             self._look_anew()
 
     def ask(self, verb: str, sensor: str) -> str:
-        """Have the daemon recalibrate a sensor, or inhibit or allow it by GATE; what was done. Raises GesturedError."""
+        """Let the daemon recalibrate a sensor, or inhibit or allow it by GATE. Returns words; raises GesturedError."""
         gate = {} if verb == "recalibrate" else {"gate": GATE}
         with Control(self._control) as control:
             answer = control.ask(verb, sensor=sensor, **gate)
@@ -80,14 +80,14 @@ class Source:
                 return "; ".join(WORDS[verb](answer))
 
     def flag(self, note: str) -> str:
-        """Keep what the flight recorder holds as a recording; what was done, in words. Raises GesturedError."""
+        """Keep what the flight recorder holds as a recording. Returns words; raises GesturedError."""
         path = flag_path(self._folder)
         with Control(self._control) as control:
             keeper = flag(control, path, note)
         return f"{path}: {keeper.packets} packets, {keeper.events} events"
 
     def close(self) -> None:
-        """Ask for nothing more."""
+        """End all streams, and the connection to the daemon."""
         self._closed.set()
         for outbox in list(self._open):
             outbox.close()
@@ -95,7 +95,7 @@ class Source:
             self._look_anew()
 
     def _look_again_and_again(self) -> None:
-        """Look on over a connection to the daemon, and over the next one once it is back or something else is asked."""
+        """Follow the daemon, with a new connection when the last one failed or other sensors are looked at."""
         while not self._closed.is_set():
             with self._changed:
                 self._changed.wait_for(lambda: self._open or self._closed.is_set())
@@ -103,12 +103,12 @@ class Source:
                 with Control(self._control, SILENT_S) as control:
                     self._look(control)
             except (GesturedError, OSError) as error:
-                self._state = {}  # who comes meanwhile is not told how it was
+                self._state = {}  # a browser that joins meanwhile gets no old state
                 self._tell("gone", {"reason": str(error)})
                 self._closed.wait(AGAIN_S)
 
     def _look(self, control: Control) -> None:
-        """Tell what the daemon streams, until somebody looks at something else."""
+        """Pass on what the daemon streams, until browsers want something else. Raises Refused, Unreachable."""
         self._latest = {}
         looked_at = self._wanted()
         if looked_at is None:
@@ -125,7 +125,7 @@ class Source:
                 self._pass_on(line)
 
     def _lines(self, control: Control) -> Iterator[dict[str, Any]]:
-        """What the daemon streams. Raises Unreachable where it stops to, without hanging up."""
+        """The lines that the daemon streams. Raises Unreachable if none comes for SILENT_S."""
         control.socket.settimeout(SILENT_S)
         try:
             yield from control.lines()
@@ -134,7 +134,7 @@ class Source:
             raise Unreachable(f"the daemon on {self._control} {said}") from None
 
     def _pass_on(self, line: dict[str, Any]) -> None:
-        """A line of the daemon, to whoever looks at what it is about."""
+        """Put a line of the daemon into the outboxes that it is for."""
         if line["type"] == "view":
             self._latest[line["sensor"]] = line
             for outbox in self._lookers(line["sensor"]):
@@ -165,7 +165,7 @@ class Source:
         return sorted({outbox.sensor for outbox in looks if outbox.sensor}), any(outbox.raw for outbox in looks)
 
     def _look_anew(self) -> None:
-        """Have the connection ended where the daemon is to stream something else, or nothing."""
+        """End the connection if the daemon is to stream something else, or nothing."""
         self._changed.notify_all()
         if self._looking is not None and self._looked_at != self._wanted():
             self._looking.finish()
