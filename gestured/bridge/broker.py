@@ -1,4 +1,4 @@
-"""An MQTT broker: where it is, who we are to it, and in words why it is not there. Nothing else imports the library."""
+"""An MQTT broker: its address, the bridge's login, and why it is not there, in words. Only this imports paho-mqtt."""
 
 import argparse
 import os
@@ -10,11 +10,11 @@ from gestured.bridge.options import LONGEST_S, BridgeError, peer_address
 from gestured.core.messages import quoted
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
-BROKER_S = 5.0  # s that the broker may take to answer a call
-KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
-MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to commands at most, which are small
+BROKER_S = 5.0  # the longest wait for the broker while connecting
+KEEPALIVE_S = 5  # each side takes the other for dead after one and a half times as long without a packet
+MOST_BYTES = 65_536  # the largest packet that the broker may send, as CONNECT says; commands are much smaller
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD as the broker knows them"
-# Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting is no help.
+# Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting does not help.
 REFUSALS = {
     132: "it does not speak MQTT 5: use a broker that does, such as mosquitto 1.6 or newer",
     133: "it does not take the name gestured-{host}: choose another one with --host",
@@ -24,14 +24,14 @@ REFUSALS = {
     142: "another bridge has the same name, {host}: give each its own with --host",
     154: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
 }
-CLOSED, SILENT = 128, 141  # the codes that the library gives where the broker named none, or said nothing for too long
+CLOSED, SILENT = 128, 141  # codes of the library: the broker gave no code, or was silent for too long
 
 
 class Broker:
-    """Where a broker is, and who we are to it."""
+    """The address of a broker, and the bridge's login there."""
 
     def __init__(self, args: argparse.Namespace, host: str) -> None:
-        """`host` is this machine's name in topics. Raises BridgeError for what cannot be."""
+        """`host` is this machine's name in topics. Raises BridgeError for arguments that cannot be used."""
         try:
             self.address = peer_address(args.broker, TLS_PORT if args.tls else PLAIN_PORT)
         except argparse.ArgumentTypeError as error:
@@ -45,27 +45,27 @@ class Broker:
         self._tls = tls_context(args)
 
     def client(self, will: str) -> Any:
-        """A client for one connection; where we vanish without a good-bye, the broker says `offline` at `will`.
+        """A client for one connection. The broker publishes `offline` at the topic `will` if the client vanishes.
 
-        `on_failure` of it must be set: its thread calls it, besides the library's own callbacks, where it dies.
+        The client's `on_failure` must be set: its thread calls `on_failure` if it dies of an exception.
         """
         from paho.mqtt.client import Client, MQTTv5
         from paho.mqtt.enums import CallbackAPIVersion
 
         class Guarded(Client):
-            """One whose thread tells whatever it dies of: the library would have us believe that it is connected."""
+            """A client whose thread reports an exception that ends it; else the client would still seem connected."""
 
             on_failure: Callable[[OSError], None]
 
             def loop_forever(self, *arguments: Any, **options: Any) -> Any:
                 try:
                     return super().loop_forever(*arguments, **options)
-                except Exception as error:  # of a broken packet it raises a dozen types
+                except Exception as error:  # for a broken packet the library raises a dozen types
                     if (sock := self.socket()) is not None:
                         sock.close()
                     self.on_failure(OSError(f"it sent what cannot be read ({error!r})"))
 
-        # The name is the same after a kill, so that an old last will comes before us.
+        # After a kill the name is the same, so that the broker ends the old session, with its last will, first.
         name = f"gestured-{self._host}"
         client = Guarded(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5, reconnect_on_failure=False)
         client.connect_timeout = BROKER_S
@@ -76,15 +76,15 @@ class Broker:
         return client
 
     def call(self, client: Any) -> None:
-        """Connect, and have a thread of the library's serve the connection. Raises OSError."""
+        """Connect, and start the library's thread that serves the connection. Raises OSError."""
         most = properties("CONNECT", MaximumPacketSize=MOST_BYTES)
         client.connect(self.address.host, self.address.port, KEEPALIVE_S, clean_start=True, properties=most)
         client.loop_start()
 
     def why(self, error: Any, held_s: float | None) -> str:
-        """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help.
+        """The OSError or reason code that ended a connection, in words. Raises BridgeError if waiting does not help.
 
-        `held_s` is for how long the broker had let us in; None where it had not.
+        `held_s` is how long the connection lasted once the broker had accepted it; None if it did not.
         """
         said, code = str(error), getattr(error, "value", 0)
         if "CERTIFICATE_VERIFY_FAILED" in said:
@@ -106,18 +106,18 @@ class Broker:
         return f"it closed the connection{who if held_s < LONGEST_S else ''}"
 
     def hear(self, client: Any, topic: str) -> None:
-        """Subscribe to commands: none that is retained, and each with the word whether it shall be."""
+        """Subscribe to commands at `topic`: no retained ones, and each with the flag whether it is to be retained."""
         from paho.mqtt.subscribeoptions import SubscribeOptions
 
         client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
 
     def unwritable(self, code: object) -> BridgeError:
-        """What is to be said where the broker does not take what we publish."""
+        """The error to raise if the broker does not let the bridge publish."""
         topics = f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/#"
         return self._unallowed(f"publish ({code})", f"write {topics}")
 
     def unreadable(self, code: object, topic: str) -> BridgeError:
-        """What is to be said where the broker does not let us hear commands."""
+        """The error to raise if the broker does not let the bridge subscribe to commands."""
         return self._unallowed(f"hear commands ({code})", f"read {topic}")
 
     def _unallowed(self, what: str, right: str) -> BridgeError:
@@ -126,22 +126,22 @@ class Broker:
 
 
 def _variable(name: str) -> str | None:
-    """The user or the password from the environment; None where it is not set, or empty. Raises BridgeError."""
+    """An environment variable (user or password); None if it is not set or empty. Raises BridgeError."""
     found = os.environ.get(name) or None
     try:
         (found or "").encode()
-    except UnicodeEncodeError:  # what it says may be secret
+    except UnicodeEncodeError:  # the message has no value, which may be secret
         raise BridgeError(f"{name}: expected text in UTF-8") from None
     return found
 
 
 def topic_of(host: str, *parts: str) -> str:
-    """A topic of this machine's at any broker, such as gestured/HOST/SENSOR/TYPE."""
+    """A topic of this machine, such as gestured/HOST/SENSOR/TYPE."""
     return "/".join(("gestured", host, *parts))
 
 
 def properties(packet: str, **values: int) -> Any:
-    """Properties of a kind of packet of MQTT 5, such as CONNECT."""
+    """The MQTT 5 properties of a packet of that type, such as CONNECT."""
     from paho.mqtt.packettypes import PacketTypes
     from paho.mqtt.properties import Properties
 
@@ -152,7 +152,7 @@ def properties(packet: str, **values: int) -> Any:
 
 
 def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:
-    """How to encrypt; None for a plain connection. Raises BridgeError."""
+    """The TLS context; None for a plain connection. Raises BridgeError."""
     if not args.tls:
         if args.ca or args.cert:
             raise BridgeError("--ca and --cert are for encrypted connections: add --tls")

@@ -1,4 +1,4 @@
-"""The command line of gestured-bridge: one file per bus."""
+"""The command line of gestured-bridge; each bus has a module of its own."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -24,8 +24,8 @@ def parser() -> Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one bridge until it is ended; returns the exit status (0 ended as asked, 1 it cannot work, 2 usage)."""
+    """Run one bridge until it is ended; returns the exit status (0 ended, 1 cannot work, 2 wrong usage)."""
     try:
         return run(parser(), argv)
-    except KeyboardInterrupt:  # while the modules of the bridges were imported
+    except KeyboardInterrupt:  # Ctrl-C during the imports of the bridges
         return 0

@@ -1,4 +1,4 @@
-"""What a bridge counts, says, and shows to Prometheus."""
+"""The counters of a bridge, its log, and its metrics for Prometheus."""
 
 import sys
 from collections import Counter
@@ -18,35 +18,35 @@ HELP = {
     "connected": "Whether the other side is there",
     "reconnects": "How often the other side was found again",
 }
-ASK_S = 5.0  # between two pieces of a request for metrics: a connection costs a thread and a descriptor
+ASK_S = 5.0  # the longest wait for more of a request for metrics, since a connection costs a thread and a descriptor
 
 
 class Counts:
-    """Numbers of one bridge: (name, label) -> value. `connected` is a gauge, the others only grow."""
+    """The numbers of one bridge, by name and label. `connected` is a gauge, the others are counters."""
 
     def __init__(self, bridge: str) -> None:
         self.bridge = bridge
         self.values: Counter[tuple[str, str]] = Counter()
-        self._words: dict[str, str] = {}  # side -> how it is, for systemd's status line
+        self._words: dict[str, str] = {}  # by side, such as "broker": its state in words, for systemd's status line
         self._ready = False
-        self._metrics: str | None = None  # HOST:PORT of /metrics, where they are served
+        self._metrics: str | None = None  # HOST:PORT of /metrics, if they are served
 
     def add(self, name: str, label: str, count: int = 1) -> None:
-        """Count so many more under a name and a label."""
+        """Add `count` to the number of that name and label."""
         self.values[name, label] += count
 
     def say(self, words: str) -> None:
-        """Tell whoever reads the log."""
+        """Write a line to the log."""
         say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
 
     def wrong(self, words: str) -> None:
-        """Count a line that no daemon says, and say the first."""
+        """Count a line that no daemon sends, and log the first."""
         if ("events", "wrong") not in self.values:
             self.say(words)
         self.add("events", "wrong")
 
     def connected(self, side: str, is_there: bool, words: str) -> None:
-        """Whether a side is there now; said where it changes."""
+        """Take note of whether a side is there now, and log `words` if that has changed."""
         key = ("connected", side)
         if key in self.values and self.values[key] == is_there:
             return
@@ -56,17 +56,17 @@ class Counts:
         self.say(words)
         self._words[side] = words
         here = all(self.values["connected", each] for each in self._words)
-        # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.
+        # gesturectl doctor reads the first word of STATUS. READY=1 means started, even if a side is not there.
         notify(f"READY=1\nSTATUS={'connected' if here else 'waiting'}: {'; '.join(self._words.values())}")
 
     def ready(self, **where: object) -> None:
-        """Say once that it works, as one line of JSON on standard output."""
+        """Print once that the bridge works, as a line of JSON on standard output."""
         if not self._ready:
             self._ready = True
             say_json({"type": "ready", "bridge": self.bridge, **where, "metrics": self._metrics})
 
     def serve(self, address: Address | None) -> None:
-        """Answer /metrics from a thread of its own, where an address is given."""
+        """Answer /metrics in a thread of its own, if an address is given. Raises BridgeError."""
         if address is None:
             return
         import prometheus_client
@@ -92,5 +92,5 @@ class Counts:
         except OSError as error:
             raise BridgeError(f"--metrics {address}: {error.strerror}: choose another address") from None
         server.RequestHandlerClass.timeout = ASK_S  # type: ignore[attr-defined]
-        server.handle_error = lambda *_: None  # type: ignore[method-assign] # who asks too slowly is nobody's bug
+        server.handle_error = lambda *_: None  # type: ignore[method-assign] # a slow client is no bug
         self._metrics = str(Address(address.host, server.server_port))

@@ -1,4 +1,4 @@
-"""What a bridge knows of the daemon that it mirrors: whether it is there, its gestures and sensors, an event's age."""
+"""The daemon that a bridge mirrors: whether it is there, its gestures and sensors, and the age of its events."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,19 +9,19 @@ from gestured.client.subscriber import Subscriber
 from gestured.core.address import is_sensor
 from gestured.core.messages import quoted
 
-NOTICE_S = 0.25  # after which a daemon that is not there is noticed
-GONE = "gone"  # the type of a line of ours: the daemon is not there, or has hung up, and is called until it is back
-MOST_SENSORS = 4096  # names that are remembered: whoever can send frames can invent some
-DRIFT = 0.1  # s in a second by which a sensor's clock may run away from ours; real ones do a ten-thousandth of it
-OLD_S = 1.0  # an event that is older helps nobody any more: the window would open a second late
+NOTICE_S = 0.25  # an absent daemon is noticed after so long
+GONE = "gone"  # the type of a line that the bridge makes: the daemon is not there; connecting goes on
+MOST_SENSORS = 4096  # the most names that are remembered, since any sender of frames can invent some
+DRIFT = 0.1  # s in a second by which a sensor's clock may drift; real ones drift a ten-thousandth of it
+OLD_S = 1.0  # an older event is of no use: a window would open a second late
 
 Line = Mapping[str, Any]
 
 
 def follow(subscriber: Subscriber, counts: Counts) -> Iterator[Line]:
-    """Each line of a daemon, its hello among them, and GONE where it is not there; until the subscriber is closed.
+    """Each line of a daemon, also its hello, and a line GONE if it is not there; until the subscriber is closed.
 
-    The subscriber has a timeout of NOTICE_S. A line with a name that cannot stand in a topic is passed over.
+    The subscriber needs a timeout of NOTICE_S. A line with a name that cannot stand in a topic is counted and skipped.
     """
     missed = False
     while True:
@@ -40,7 +40,7 @@ def follow(subscriber: Subscriber, counts: Counts) -> Iterator[Line]:
 
 
 def _wrong_name(line: Line) -> str | None:
-    """Which name in a line cannot stand in a topic or a key; None where all can."""
+    """The name in a line that cannot stand in a topic or a key, and what was expected; None if all can."""
     said = line["sensors"] if line["type"] in ("hello", "status") else ()
     for name in (line["type"], line.get("sensor", "-"), *said):
         if not is_sensor(name):
@@ -49,21 +49,21 @@ def _wrong_name(line: Line) -> str | None:
 
 
 class Daemon:
-    """How a daemon is, from the lines that it said."""
+    """The state of a daemon, from its lines."""
 
     def __init__(self, sensors: Sequence[str] | None, gestures: Sequence[str] | None, counts: Counts) -> None:
-        """`sensors` and `gestures`: the subscription's filters, None for all. `counts` learns whether it is there."""
+        """`sensors` and `gestures`: the subscription's filters, None for all. `counts`: told if the daemon is there."""
         self._counts = counts
-        self.hello: Line = {}  # empty while it is away
-        self.version = ""  # the last one that was there
-        self.states: dict[str, str] = {}  # sensor -> how it is, the one heard of last at the end; kept while it is away
-        self.gestures: list[str] | None = None  # None until it has said them
-        self.listening: dict[str, Line] = {}  # sensor -> what gates and arming say; none where there is nothing
+        self.hello: Line = {}  # empty while the daemon is away
+        self.version = ""  # of the last daemon that was there
+        self.states: dict[str, str] = {}  # by sensor, in the order of news; kept while the daemon is away
+        self.gestures: list[str] | None = None  # None until the daemon has told them
+        self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
-        self._lags: dict[str, tuple[float, float]] = {}  # sensor -> its smallest lag, and when that was found
+        self._lags: dict[str, tuple[float, float]] = {}  # by sensor: smallest lag in s, and when it was updated
 
     def take(self, line: Line) -> None:
-        """One line of `follow`."""
+        """Take one line of `follow`."""
         match line["type"]:
             case "hello":
                 self.hello, self.version = line, line["version"]
@@ -88,7 +88,7 @@ class Daemon:
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.
 
-        A sensor's own clock may be off by any time, so its lag is counted from the smallest one so far.
+        A sensor's own clock may be wrong by any time, so the age is the lag beyond the smallest lag so far.
         """
         if event.get("decided") is None:
             return 0.0
@@ -106,7 +106,7 @@ class Daemon:
         return json.dumps(told, separators=(",", ":")).encode()
 
     def _heard(self, heard: Mapping[str, str]) -> None:
-        """How sensors are. The dict is a new one each time: another thread may read the old one."""
+        """Update the states of sensors. The dict is replaced, since another thread may read the old one."""
         wanted = self._wanted_sensors
         new = {name: state for name, state in heard.items() if wanted is None or name in wanted}
         states = {name: state for name, state in self.states.items() if name not in new} | new

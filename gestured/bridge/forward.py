@@ -1,8 +1,8 @@
-"""Frames that come in over Zenoh, on their way to the daemon's UDP port.
+"""Frames that come over Zenoh, sent on to the daemon's UDP port.
 
-Zenoh drops what does not fit through the way to us, whoever sent it, so one sender that floods its key would silence
-all others. While one does, the others that are known are each subscribed to by their own key instead of all by a
-wildcard: the routers then do not send us the flood at all.
+If more packets come than the connection carries, Zenoh drops packets of every sender. So a sender that floods its key
+would silence all others. During a flood the bridge subscribes to the key of each other known sender instead of to a
+wildcard, so that the routers do not send the flood.
 """
 
 import socket
@@ -18,23 +18,23 @@ from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError, ProtocolError
 from gestured.core.osc import decode
 
-MOST_SENDERS = 512  # sensors from Zenoh, each with a socket of its own: the daemon shares its work out by sources
-SILENT_S = 60.0  # a sender that says nothing for so long gives its place to another, as in the daemon
-MOST_HZ = 2000.0  # packets of one sender: twice what the fastest sensor sends
-BURST_S = 1.0  # for which a sender may be ahead of that: what was held up on its way comes at once
-APART_S = 20.0  # for which a flood is kept away; senders that are not known then are not heard
-LOOK_S = 0.25  # for which everybody is heard again after that, so that others become known
+MOST_SENDERS = 512  # each has a socket of its own, since the daemon shares its time among sources
+SILENT_S = 60.0  # a sender that is silent for so long gives its place to another, as in the daemon
+MOST_HZ = 2000.0  # packets a second of one sender: twice as many as the fastest sensor sends
+BURST_S = 1.0  # a sender may be so far ahead of MOST_HZ, since packets that were held up come at once
+APART_S = 20.0  # a flood is kept away for so long; meanwhile unknown senders are not heard
+LOOK_S = 0.25  # after that, all senders are heard for so long at least, so that new ones become known
 
 
 @dataclass(slots=True)
 class _Sender:
-    """A sensor that sends through Zenoh."""
+    """A sensor that sends over Zenoh."""
 
     socket: socket.socket
     due: float  # monotonic s, when the next packet would come at MOST_HZ
 
     def floods(self, now: float) -> bool:
-        """Count a packet, unless it is one too many."""
+        """Whether a packet at `now` s is one too many; if not, it is counted."""
         if self.due > now + BURST_S:
             return True
         self.due = max(self.due, now) + 1.0 / MOST_HZ
@@ -42,28 +42,28 @@ class _Sender:
 
 
 class Forward:
-    """Frames from Zenoh to the daemon, byte by byte as they came: their counter and time stay."""
+    """Sends packets from Zenoh to the daemon unchanged, so that their counter and time stay."""
 
     def __init__(self, site: str, to: Address, counts: Counts, clock: Callable[[], float] = time.monotonic) -> None:
-        """`site` is what all keys begin with. Raises GesturedError where `to` is no address."""
+        """`site` is the beginning of all keys, gestured/SITE. Raises GesturedError if `to` cannot be looked up."""
         self._site, self._counts, self._clock = site, counts, clock
         with connected(to) as found:  # a name is looked up once
             self._to = Address(*found.getpeername()[:2])
-        self._senders: dict[str, _Sender] = {}  # by name; who was heard last stands last
+        self._senders: dict[str, _Sender] = {}  # by name; the one heard last is at the end
         self._flooding: set[str] = set()
         self._closed = False
-        self._changed = threading.Condition()  # guards all of these: each connection of Zenoh has a thread of its own
+        self._changed = threading.Condition()  # guards the fields above, since each connection of Zenoh has a thread
 
     def take(self, sample: Any) -> None:
-        """A packet from Zenoh; what is none, or of another sensor than its key says, is dropped and counted."""
+        """Send a packet on. One that is not OSC, or of another sensor than its key names, is dropped and counted."""
         key = str(sample.key_expr)
         name = key.removeprefix(f"{self._site}/").removesuffix("/frames")
-        sound = is_sensor(name) and key == self._key(name)  # a key that somebody publishes under may have wildcards
+        sound = is_sensor(name) and key == self._key(name)  # a sender may publish under a key with wildcards
         with self._changed:
             self._counts.add("frames", self._forward(name, sample.payload) if sound else "refused")
 
     def hear(self, subscribe: Callable[[str], Any]) -> None:
-        """Have `take` called, and keep floods away, until it is closed; `subscribe` declares a key's subscriber."""
+        """Subscribe to senders, and keep floods away, until `close`; `subscribe(key)` makes Zenoh call `take`."""
 
         def subscribed(name: str) -> Any:
             return subscribe(self._key(name))
@@ -98,13 +98,13 @@ class Forward:
         return f"{self._site}/{name}/frames"
 
     def _wait(self, flooding: set[str], seconds: float | None = None) -> bool:
-        """Wait until others than these flood; False where it is closed or the time is over before that."""
+        """Wait until the flooding senders are others than `flooding`; False if closed, or the time is over first."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._flooding != flooding, seconds)
             return not self._closed and self._flooding != flooding
 
     def _forward(self, name: str, payload: Any) -> str:
-        """Send a packet on; returns what became of it."""
+        """Send a packet on; returns the label under which it is counted."""
         try:
             sender = self._sender(name)
         except GesturedError:  # the network is down
@@ -127,7 +127,7 @@ class Forward:
             return "unheard"
 
     def _sender(self, name: str) -> _Sender | None:
-        """Who sends under a name; None where all places are taken by others."""
+        """The sender of that name, made if it is new; None if all places are taken. Raises GesturedError."""
         now = self._clock()
         sender = self._senders.pop(name, None)
         if sender is None:

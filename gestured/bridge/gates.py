@@ -1,7 +1,7 @@
-"""Gates that a bus closes and opens: its commands go to the daemon's socket for bridges, in one name of our own.
+"""A gate that a bus closes and opens: the bridge passes its commands to the daemon's socket for bridges.
 
-The daemon alone knows what is closed. What it says is closed in our name we repeat, so that it can tell that we and our
-bus are alive; where we are not, the gate stays closed.
+Only the daemon keeps whether the gate is closed. The bridge repeats for which sensors it is, so that the daemon knows
+that bridge and bus are alive; without repetitions the gate stays closed, and the daemon reports it as overdue.
 """
 
 import time
@@ -13,22 +13,22 @@ from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.errors import GesturedError
 
-ON, OFF = "ON", "OFF"  # commands: a sensor shall listen, as far as this gate goes, or be silent
-ALIVE_S = 30.0  # within which we repeat what is closed
-REPEAT_S = 10.0
-ANSWER_S = 2.0  # for the daemon, which answers in milliseconds
+ON, OFF = "ON", "OFF"  # commands: open the gate of a sensor, so that it listens, or close it
+ALIVE_S = 30.0  # the daemon is promised a repetition within so long
+REPEAT_S = 10.0  # a closed gate is repeated so often
+ANSWER_S = 2.0  # the longest wait for the daemon, which answers in milliseconds
 
 
 class Gate:
-    """One gate, by name, of each sensor of a daemon."""
+    """The gate of one name of all sensors of a daemon."""
 
     def __init__(self, path: Path, name: str, counts: Counts) -> None:
         """`path` is the daemon's socket for bridges."""
         self.name = name
         self._path, self._counts = path, counts
         self._said = ""  # why the last command failed
-        self._due = 0.0  # monotonic s, when what is closed is repeated
-        self._answered = 0.0  # s since 1970, when the daemon last did as asked
+        self._due = 0.0  # monotonic s, the next repetition
+        self._answered = 0.0  # s since 1970, when the daemon last carried out a command
 
     def obey(self, sensor: str, command: str) -> list[str]:
         """Carry out a command; returns the gates of the sensor that are closed now. Raises GesturedError."""
@@ -47,22 +47,23 @@ class Gate:
                 return closed
         except GesturedError as error:
             self._counts.add("commands", "failed")
-            if str(error) != self._said:  # a bus may ask for the same again and again
+            if str(error) != self._said:  # a bus may repeat a command that fails
                 self._said = str(error)
                 self._counts.say(f"{sensor} {command}: {error}")
             raise
 
     def repeat(self, closed: Iterable[str], told: float) -> None:
-        """Repeat, now and then, that the gate is closed for these sensors, as the daemon's status of `told` says.
+        """Repeat every REPEAT_S that the gate is closed for these sensors, by the daemon's status at `told` (s, epoch).
 
-        A status that is older than the daemon's last answer, `told` in s since 1970, may say of a gate that it is
-        closed which has been opened since; to repeat that would close it. Several wait where the daemon was slow.
+        A status that is older than the daemon's last answer is ignored: it may call a gate closed that was opened
+        since, and a repetition would close it. Several such statuses may wait if the daemon was slow.
         """
-        if 0.0 <= self._answered - told < ALIVE_S or time.monotonic() < self._due:  # a clock may have been set back
+        # An answer that seems to be much newer than the status shows that a clock was set back.
+        if 0.0 <= self._answered - told < ALIVE_S or time.monotonic() < self._due:
             return
         self._due = time.monotonic() + REPEAT_S
         for sensor in closed:
             try:
                 self.obey(sensor, OFF)
             except GesturedError:
-                return  # it is said; the next time may do
+                return  # `obey` has logged the error; the next repetition may succeed

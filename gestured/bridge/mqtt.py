@@ -1,15 +1,15 @@
 """`gestured-bridge mqtt`: gesture events to an MQTT broker, with Home Assistant discovery.
 
     gestured/{host}/{sensor}/{type}    an event in JSON as on the socket, with the daemon's `instance`; never retained
-    gestured/{host}/{sensor}/state     how the sensor is, retained
-    gestured/{host}/{sensor}/gates     whether it listens, as JSON, retained
+    gestured/{host}/{sensor}/state     the state of the sensor, retained
+    gestured/{host}/{sensor}/gates     its closed gates and arming, as JSON, retained
     gestured/{host}/{sensor}/gate/set  with --gates: `OFF` closes a gate of the sensor, `ON` opens it; never retained
     gestured/{host}/availability       `online` or `offline`, retained; `offline` also by last will
 
-All with QoS 1, so that an event may come twice: `instance`, `sensor` and `sequence` tell.
+All with QoS 1, so that an event may come twice; its `instance`, `sensor` and `sequence` are then the same.
 
-An event is worth something while it is fresh: what is older than OLD_S when the broker can be reached is not sent, and
-the broker keeps none longer for a subscriber. The gap in `sequence` says what was missed.
+An event is of use only while it is fresh. One that is older than OLD_S when the broker can be reached is not sent, and
+the broker keeps none longer for a subscriber. A gap in `sequence` shows how many were missed.
 """
 
 import argparse

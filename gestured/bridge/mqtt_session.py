@@ -1,4 +1,4 @@
-"""What the bridge to MQTT does while it runs: one daemon's events, and what is known of it, at one broker."""
+"""A session of the MQTT bridge: it publishes one daemon's events and state at one broker, and takes commands."""
 
 import argparse
 import queue
@@ -19,16 +19,16 @@ from gestured.bridge.options import FIRST_S, LONGEST_S, STATUS, host_name
 from gestured.bridge.retained import OPEN, Retained
 from gestured.core.errors import GesturedError
 
-COMMAND = ("gate", "set")  # below a sensor, in a topic
-EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
-LAST_S = 1.0  # for the broker's answer to our good-bye; without it, it publishes our last will
-WAITING_EVENTS = 1000  # events that are kept for the broker; more than a second of the busiest daemon
-IN_FLIGHT = 20  # messages whose acknowledgement is awaited at a time, where the broker does not ask for fewer
+COMMAND = ("gate", "set")  # the levels of a topic for commands, below the sensor
+EXPIRY_S = 1  # a broker keeps an event for a subscriber as long as OLD_S, which MQTT counts in whole seconds
+LAST_S = 1.0  # the longest wait for the broker at the end; if it does not answer, it publishes the last will
+WAITING_EVENTS = 1000  # the most events that wait for the broker: more than a second of the busiest daemon
+IN_FLIGHT = 20  # the most messages that await their acknowledgement, unless the broker asks for fewer
 
 
 @dataclass(frozen=True, slots=True)
 class Outgoing:
-    """An event that the broker shall have."""
+    """An event to be published."""
 
     decided: float  # monotonic s
     topic: str
@@ -36,13 +36,13 @@ class Outgoing:
 
 
 class Mqtt:
-    """A session with one broker, across its disappearances and the daemon's.
+    """A session with one broker, which goes on when broker or daemon are away for a while.
 
-    All of it happens in the thread that calls `work`: whatever another thread learns, it puts into the inbox.
+    Everything is done in the thread that calls `work`; other threads put what they learn into the inbox.
     """
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
-        """Raises BridgeError for what cannot be."""
+        """Raises BridgeError for arguments that cannot be used."""
         self._host = host_name(args.host)
         self._broker = Broker(args, self._host)
         self._availability = topic_of(self._host, "availability")
@@ -52,37 +52,37 @@ class Mqtt:
         self._commanded = topic_of(self._host, "+", *COMMAND)
         gate = None if self._gate is None else self._gate.name
         self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
-        self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
-        self._obeying = threading.Lock()  # held while a command is put into `_commands`, or taken from it
+        self._commands: dict[str, str] = {}  # by sensor: the last command that was not carried out yet
+        self._obeying = threading.Lock()  # guards `_commands`
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # a signal handler may put into it
         self._stopping = False
-        self._client: Any = None  # of this connection, from the call on; None while there is none
+        self._client: Any = None  # of this connection, from the attempt to connect on; None if there is none
         self._connected = False
-        self._wait_s, self._due = FIRST_S, 0.0  # monotonic s: when the broker is called next
-        self._since = 0.0  # monotonic s: when it let us in
+        self._wait_s, self._due = FIRST_S, 0.0  # s, the next pause; monotonic s, the next attempt to connect
+        self._since = 0.0  # monotonic s, when the broker accepted the connection
         self._waiting: deque[Outgoing] = deque()  # events for the broker, in order
-        self._sent: dict[int, Outgoing] = {}  # message's number -> event that it has not acknowledged
-        self._changed = False  # what the broker should retain may be something else now
-        self._changes: Iterator[tuple[str, str]] = iter(())
-        self._change = 0  # number of the one that it has not acknowledged
-        self._farewell = 0  # number of our last word
-        self._most = 0  # messages that may be in flight, before our last word
+        self._sent: dict[int, Outgoing] = {}  # by message number: events that the broker has not acknowledged
+        self._changed = False  # whether the broker may have to retain something else now
+        self._changes: Iterator[tuple[str, str]] = iter(())  # retained messages to be published
+        self._change = 0  # number of the retained message that the broker has not acknowledged, or 0
+        self._farewell = 0  # number of the last message, "offline"
+        self._most = 0  # messages that may be in flight, without the last one
 
     def stop(self) -> None:
-        """Say good-bye, and let `work` end; at once, whatever else waits."""
+        """Let `work` end at once with the last message, whatever else waits."""
         self._stopping = True
         self._inbox.put(lambda: None)
 
     def hear(self, lines: Iterator[Line]) -> None:
-        """Take each line of `follow`; in a thread of its own."""
+        """Take each line of `follow`; called in a thread of its own."""
         try:
             for line in lines:
                 self._inbox.put(partial(self._take, line))
-        except GesturedError as error:  # a subscription that is refused, for one
+        except GesturedError as error:  # such as a subscription that is refused
             self._inbox.put(partial(self._fail, error))
 
     def work(self) -> None:
-        """Be connected, and connect again; until it is stopped. Raises GesturedError where waiting does not help."""
+        """Connect, and connect again, until `stop` is called. Raises GesturedError if waiting does not help."""
         while not self._stopping:
             if self._client is None and time.monotonic() >= self._due:
                 self._call()
@@ -94,7 +94,7 @@ class Mqtt:
             self._serve(end)
 
     def _serve(self, until: float | None) -> None:
-        """Do what the next message of the inbox says; nothing where none comes until then (monotonic s)."""
+        """Call the next function in the inbox, if one comes before `until` (monotonic s; None: wait for it)."""
         with suppress(queue.Empty):
             self._inbox.get(timeout=None if until is None else max(until - time.monotonic(), 0.0))()
 
@@ -102,9 +102,9 @@ class Mqtt:
         raise error
 
     def _take(self, line: Line) -> None:
-        """One line of the daemon."""
+        """Take one line of the daemon."""
         self._daemon.take(line)
-        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
+        if "sensor" in line:  # an event, which the daemon has filtered already
             if len(self._waiting) >= WAITING_EVENTS:
                 self._waiting.popleft()
                 self._counts.add("events", "overflow")
@@ -117,7 +117,7 @@ class Mqtt:
         self._send()
 
     def _call(self) -> None:
-        """Call the broker, in a thread of its own: a name that is not known may take its time."""
+        """Connect to the broker in a thread of its own, since the look-up of a name may take long."""
         client = self._client = self._broker.client(self._availability)
 
         def told(what: Callable[..., None], *which: int) -> Callable[..., None]:
@@ -138,7 +138,7 @@ class Mqtt:
         threading.Thread(target=call, name="broker", daemon=True).start()
 
     def _there(self, client: Any, code: Any, terms: Any) -> None:
-        """The broker has answered our call, and says on which terms we may be there."""
+        """The broker has answered the attempt to connect with a reason code and properties (`terms`)."""
         if code.is_failure:
             self._gone(client, code)
             return
@@ -149,12 +149,12 @@ class Mqtt:
             self._broker.hear(client, self._commanded)
         self._retained.forget()
         self._changed, self._changes, self._change = True, iter(()), 0
-        self._waiting.extendleft(reversed(self._sent.values()))  # what it has not acknowledged, before all else
+        self._waiting.extendleft(reversed(self._sent.values()))  # what was not acknowledged comes first
         self._sent.clear()
         self._send()
 
     def _gone(self, client: Any, error: Any) -> None:
-        """A connection has ended, or could not be."""
+        """A connection has ended, or could not be made."""
         if client is not self._client:
             return
         held_s = time.monotonic() - self._since if self._connected else None
@@ -169,7 +169,7 @@ class Mqtt:
             self._wait_s = min(2 * self._wait_s, LONGEST_S)
 
     def _taken(self, client: Any, number: int, code: Any) -> None:
-        """The broker has answered a message."""
+        """The broker has acknowledged or refused a message."""
         if client is not self._client:
             return
         if code.is_failure:
@@ -183,12 +183,12 @@ class Mqtt:
         self._send()
 
     def _subscribed(self, client: Any, codes: Any) -> None:
-        """The broker has answered whether we may hear commands."""
+        """The broker has accepted or refused the subscription to commands."""
         if client is self._client and codes[0].is_failure:
             raise self._broker.unreadable(codes[0], self._commanded)
 
     def _hear(self, message: Any) -> None:
-        """A command, in the library's thread. Of several for one sensor that have not been obeyed the last counts."""
+        """Take a command, in the library's thread. A newer command for a sensor replaces one that still waits."""
         sensor = message.topic.split("/")[2]
         command = message.payload.decode(errors="replace")
         if message.retain or command not in (ON, OFF) or sensor not in self._daemon.states:
@@ -207,14 +207,14 @@ class Mqtt:
         try:
             closed = self._gate.obey(sensor, command)
         except GesturedError:
-            return  # it was said; the switch shows what is so
+            return  # `Gate` has logged it; the retained state, and so any switch, stays as it is
         self._counts.add("commands", "obeyed")
         self._daemon.listening[sensor] = {**OPEN, **self._daemon.listening.get(sensor, {}), "closed": closed}
         self._changed = True
         self._send()
 
     def _send(self) -> None:
-        """Publish what waits, as far as the broker keeps up."""
+        """Publish what waits, as far as the broker has acknowledged earlier messages."""
         if not self._connected or self._stopping:
             return
         while not self._change and len(self._sent) < self._most:
@@ -236,6 +236,6 @@ class Mqtt:
             self._counts.ready(broker=str(self._broker.address), host=self._host)
 
     def _publish(self, topic: str, payload: str | bytes, **options: Any) -> int:
-        """Have a message sent; returns its number. With QoS 1 it may come twice, but is not lost on the way."""
+        """Publish a message with QoS 1 (it may come twice, but is not lost on the way); returns its number."""
         number: int = self._client.publish(topic, payload, qos=1, **options).mid
         return number

@@ -1,4 +1,4 @@
-"""What the bridges' command lines have in common."""
+"""The options and helpers that the bridges' command lines share."""
 
 import argparse
 import importlib
@@ -15,9 +15,9 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
 
-# s, from one attempt to reach a bus to the next: twice as long each time, so that one that is back is found soon.
+# s, from one attempt to reach a bus to the next; doubled each time up to a bound that finds a returning bus soon.
 FIRST_S, LONGEST_S = 0.25, 2.0
-STATUS = "status"  # the type of the line that says how each sensor is, once a second
+STATUS = "status"  # the type of the line with the states of all sensors, which comes once a second
 
 
 class BridgeError(GesturedError):
@@ -25,7 +25,7 @@ class BridgeError(GesturedError):
 
 
 def need(module: str, package: str, extra: str) -> None:
-    """See to it that the library of a bus is there, before anything is begun. Raises BridgeError."""
+    """Check that the library of a bus is installed, before anything else. Raises BridgeError."""
     try:
         importlib.import_module(module)
     except ImportError:
@@ -34,7 +34,7 @@ def need(module: str, package: str, extra: str) -> None:
 
 
 def add_filters(parser: argparse.ArgumentParser) -> None:
-    """Add which daemon is heard, and what of it."""
+    """Add the flags for the daemon's event socket and the subscription's filters."""
     text = "the daemon's event socket (default: the daemon's own default)"
     parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
     text = f"which events, with commas, of {', '.join(EVENT_TYPES)} (default: gesture)"
@@ -44,19 +44,19 @@ def add_filters(parser: argparse.ArgumentParser) -> None:
 
 
 def add_metrics(parser: argparse.ArgumentParser) -> None:
-    """Add where Prometheus may ask."""
+    """Add the flag for the address of /metrics."""
     text = "HTTP address of /metrics; port 0 takes any free port (default: off)"
     parser.add_argument("--metrics", type=bind_address, metavar="HOST:PORT", help=text)
 
 
 def add_destination(parser: argparse.ArgumentParser) -> None:
-    """Add which daemon takes frames."""
+    """Add the flag for the daemon that takes frames."""
     text = "where the daemon listens for frames (default: 127.0.0.1:9000)"
     parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
 
 
 def plain(name: str) -> str:
-    """A name with an underscore for all but letters, digits, _ and -: Home Assistant's discovery takes nothing else."""
+    """A name with _ in place of all but letters, digits, _ and -, as Home Assistant's discovery requires."""
     return re.sub(r"[^A-Za-z0-9_-]", "_", name)
 
 
@@ -66,7 +66,7 @@ def host_name(named: str | None) -> str:
 
 
 def names(text: str) -> list[str]:
-    """Words between commas; for argparse."""
+    """The names between commas. Raises argparse.ArgumentTypeError if there are none."""
     found = [word.strip() for word in text.split(",") if word.strip()]
     if not found:
         raise argparse.ArgumentTypeError(f"{text!r}: expected names with commas between them")
@@ -74,14 +74,14 @@ def names(text: str) -> list[str]:
 
 
 def peer_address(text: str, port: int) -> Address:
-    """HOST or HOST:PORT of a peer, with the usual port where none is named. Raises argparse's error."""
+    """HOST or HOST:PORT of a peer, with `port` if none is named. Raises argparse.ArgumentTypeError."""
     return host_port(text if text.rpartition(":")[2].isdigit() and text.count(":") != 0 else f"{text}:{port}")
 
 
 def subscriber(args: argparse.Namespace, timeout: float, wrong: Callable[[str], None]) -> Subscriber:
-    """The subscription that was asked for, and how the sensors are. Next raises TimeoutError after `timeout` s.
+    """A subscription to the wanted events and to `status`; iterating raises TimeoutError after `timeout` s without one.
 
-    `wrong` is given a sentence about each line that no daemon says.
+    `wrong` is called with a sentence about each line that no daemon sends.
     """
     types = [*args.types, *({STATUS} - set(args.types))]
     path = args.socket or find_socket(os.environ)

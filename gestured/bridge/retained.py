@@ -1,8 +1,8 @@
-"""What an MQTT broker retains of one machine: whether its daemon is there, how each sensor is, and discovery.
+"""The messages that an MQTT broker retains of one machine: availability, states of sensors, and discovery.
 
-By Home Assistant's MQTT discovery sensors and gestures appear there by themselves. For each sensor it has one device
-with an `event` entity, and a device trigger for each gesture: event entities alone give no triggers in the editor of
-automations (home-assistant/core#158789). A binary sensor says whether the sensor listens; where this bridge has a gate,
+With Home Assistant's MQTT discovery, sensors and gestures appear there by themselves. Each sensor is a device with an
+`event` entity and a device trigger for each gesture, since event entities alone give no triggers in the editor of
+automations (home-assistant/core#158789). A binary sensor shows whether the sensor listens. If this bridge has a gate,
 a switch closes and opens it. The keys are those of home-assistant.io/integrations/event.mqtt, device_trigger.mqtt,
 binary_sensor.mqtt and switch.mqtt.
 """
@@ -16,48 +16,48 @@ from gestured.bridge.daemon import Daemon
 from gestured.bridge.gates import OFF, ON
 from gestured.bridge.options import plain
 
-# What the event entity makes of a gesture's line: what it is, and some of what is known of it.
+# The template by which the event entity reads a gesture's line: its type and some attributes.
 EVENT = (
     "{{ {'event_type': value_json.gesture, 'confidence': value_json.confidence, 'sequence': value_json.sequence,"
     " 'instance': value_json.instance} | tojson }}"
 )
 
-OPEN: dict[str, Any] = {"armed": None, "closed": [], "until": None}  # of a sensor of which a daemon says nothing else
+OPEN: dict[str, Any] = {"armed": None, "closed": [], "until": None}  # a sensor of which the daemon tells nothing
 LISTENS = "{{ 'ON' if not value_json.closed and value_json.armed != false else 'OFF' }}"
 
 
 class Retained:
-    """What a broker should retain, and what it does as far as is known."""
+    """What a broker should retain, and what it is known to retain."""
 
     def __init__(self, daemon: Daemon, host: str, prefix: str, gate: str | None = None, *, discovers: bool) -> None:
         """`prefix` is Home Assistant's discovery prefix; `discovers`: whether anything is published there.
 
-        `gate` is the name of the gate that can be closed and opened from there, if any.
+        `gate` is the name of the gate that the broker's clients can close and open, if any.
         """
         self._gate = gate
         self._daemon, self._host, self._prefix, self._discovers = daemon, host, prefix, discovers
-        self._kept: dict[str, str | None] = {}  # topic -> what the broker retains of ours; None where that is not known
+        self._kept: dict[str, str | None] = {}  # by topic: the retained payload; None if it is not known
 
     def forget(self) -> None:
-        """Another connection: the broker may have lost what it retained."""
+        """Forget the retained payloads, since the broker of a new connection may have lost them."""
         self._kept = dict.fromkeys(self._kept)
 
     def changes(self) -> Iterator[tuple[str, str]]:
-        """(topic, payload) of what the broker has to learn, an empty payload where it has to forget.
+        """(topic, payload) of each message to publish; an empty payload makes the broker forget a topic.
 
-        A pair counts as learned by the broker as soon as the generator is asked for the next pair.
+        A pair counts as retained by the broker as soon as the generator is asked for the next one.
         """
         wanted = self._wanted()
         for topic, payload in wanted.items():
             if self._kept.get(topic) != payload:
                 yield topic, payload
                 self._kept[topic] = payload
-        for topic in self._kept.keys() - wanted.keys():  # a gesture that was forgotten, a sensor that was let go
+        for topic in self._kept.keys() - wanted.keys():  # of forgotten gestures and sensors
             yield topic, ""
             del self._kept[topic]
 
     def _wanted(self) -> dict[str, str]:
-        """Topic -> what the broker should retain now."""
+        """By topic: the payload that the broker should retain now."""
         daemon = self._daemon
         wanted = {topic_of(self._host, "availability"): "online" if daemon.hello else "offline"}
         for sensor, state in daemon.states.items():
@@ -69,7 +69,7 @@ class Retained:
         return wanted
 
     def _discovery(self, sensor: str, gestures: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
-        """(topic, payload) of all that Home Assistant learns of a sensor."""
+        """(topic, payload) of each discovery message of a sensor."""
         prefix, host, gate, version = self._prefix, self._host, self._gate, self._daemon.version
         base = f"gestured/{host}"
         node = f"gestured_{host}"

@@ -1,7 +1,7 @@
-"""`gestured-bridge serial`: a sensor on a serial line, its frames sent to the daemon as OSC.
+"""`gestured-bridge serial`: the frames of a sensor on a serial line, sent to the daemon as OSC.
 
-Frames that came together because this host was slow are sent together, the newest KEPT of them: the counter tells the
-daemon which are missing, and no delay can build up. A device that goes is waited for.
+Of frames that came together because this host was slow, the newest KEPT are sent, so that no delay builds up; the
+counter tells the daemon how many are missing. If the device is unplugged, the bridge waits for it.
 """
 
 import argparse
@@ -22,14 +22,14 @@ from gestured.client.stop import on_stop
 from gestured.client.values import number, rows_by_columns, sensor_name
 from gestured.core.frames import Frame
 
-KEPT = 8  # frames that are sent where more have come at once: the newest
-QUIET_S = 0.002  # a line that says nothing for so long has ended its frame; a byte takes 0.1 ms at 115,200 baud
-POLL_S = 0.25  # the longest wait for the line before it is looked whether we are to end
-ANSWER_S = 0.25  # how long a sensor may take for its answer before it is asked again
+KEPT = 8  # the most frames that are sent of those that come at once: the newest
+QUIET_S = 0.002  # a frame is over when the line is quiet for so long; a byte takes 0.1 ms at 115,200 baud
+POLL_S = 0.25  # the longest wait for the line, after which the bridge looks whether it is to end
+ANSWER_S = 0.25  # the longest wait for a sensor's answer, after which the request is repeated
 AGAIN_S = 0.5  # from one attempt to open the device to the next
-SILENT_S = 5.0  # an open line that says nothing for so long is mentioned
-JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # bytes without a frame after which it is said what they look like
-JUDGED_TAXEL_BYTES = 64  # so many more of them for each taxel of ours: two of the longest lines of text
+SILENT_S = 5.0  # an open line that is silent for so long is reported
+JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # after so many bytes without a frame, what they look like is reported
+JUDGED_TAXEL_BYTES = 64  # so many more bytes for each taxel of the grid: two of the longest lines of text
 
 
 def add(commands: Commands) -> None:
@@ -66,7 +66,7 @@ class Serial:
     """The line of one serial sensor: its bytes become frames, and these go to the daemon."""
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
-        """Raises BridgeError for what cannot be."""
+        """Raises BridgeError for arguments that cannot be used, GesturedError if the daemon cannot be looked up."""
         protocol = PROTOCOLS[args.protocol]
         if protocol.fixed and args.grid not in (None, protocol.grid):
             raise BridgeError(f"--grid: {args.protocol} sensors have {'x'.join(map(str, protocol.grid))} taxels")
@@ -78,9 +78,9 @@ class Serial:
         self._forms = {form: Form(args.sensor, form) for form in ("floats", "ints", "uint8", "uint16")}
         self._counts = counts
         self._to, self._socket = args.to, connected(args.to)
-        self._counter, self._own = 0, Unwrapped()  # ours where the sensor has none, and the sensor's
+        self._counter, self._own = 0, Unwrapped()  # the bridge's own counter, and the sensor's
         self._stopped = False
-        self._opened = False  # ever
+        self._opened = False  # whether the device was ever open
         counts.serve(args.metrics)
 
     def stop(self) -> None:
@@ -88,7 +88,7 @@ class Serial:
         self._stopped = True
 
     def work(self) -> None:
-        """Forward, and wait for the device where it went. Raises BridgeError where waiting does not help."""
+        """Forward frames, and wait for a device that is not there. Raises BridgeError if waiting does not help."""
         while not self._stopped:
             if (port := self._open()) is not None:
                 with port:
@@ -99,10 +99,10 @@ class Serial:
                 if reason:
                     self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")
             if not self._stopped:
-                time.sleep(AGAIN_S)  # also before a device that is still there: being opened resets many boards
+                time.sleep(AGAIN_S)  # even if the device is still there, since opening it resets many boards
 
     def _open(self) -> Any:
-        """The device; None where it is to be waited for."""
+        """The opened device; None if it is not there yet. Raises BridgeError if waiting does not help."""
         import serial
 
         none = f"{self._device}: is no serial device: ls -l /dev/serial/by-id shows those that are"
@@ -112,10 +112,10 @@ class Serial:
             return serial.Serial(self._device, self._baud, timeout=0, write_timeout=ANSWER_S, exclusive=True)
         except ValueError:
             raise BridgeError(f"--baud {self._baud}: this device does not take it") from None
-        except OSError as error:  # SerialException is one
+        except OSError as error:  # or SerialException, a subclass
             code = error.errno
             said = os.strerror(code) if code else str(error)
-            if code == errno.EACCES and not self._opened:  # a device that is plugged in anew is root's for a moment
+            if code == errno.EACCES and not self._opened:  # a new device belongs to root for a moment
                 remedy = 'sudo adduser "$USER" dialout, and log in again'
                 raise BridgeError(f"{self._device}: {said}: it is for members of its group ({remedy})") from None
             if code == errno.EAGAIN:
@@ -126,11 +126,11 @@ class Serial:
             return None
 
     def _forward(self, port: Any) -> str | None:
-        """Forward what one connection brings; why it ended, None where it was we who ended it."""
+        """Forward the frames of one connection; returns why it ended, None if `stop` ended it."""
         from serial import SerialTimeoutException
 
         protocol = self._protocol(self._rows, self._columns)
-        judged: bytes | None = b""  # what came before the first frame; None once that is told
+        judged: bytes | None = b""  # bytes before the first frame; None after a frame or a report
         asked = began = time.monotonic()
         due = bool(protocol.request)
         pending = False
@@ -158,7 +158,7 @@ class Serial:
         return None
 
     def _send(self, readings: list[Reading]) -> None:
-        """The newest of them to the daemon."""
+        """Send the newest KEPT of the readings to the daemon, and count all."""
         first = max(len(readings) - KEPT, 0)
         for n, reading in enumerate(readings):
             self._counter += 1
@@ -170,7 +170,7 @@ class Serial:
             packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, moment)
             try:
                 heard = not sent_after_refusal(self._socket, packet)
-            except OSError:  # the network is down: as good as nobody who listens
+            except OSError:  # the network is down
                 heard = False
             self._counts.add("frames", "sent" if heard else "unheard")
             words = (
@@ -179,7 +179,7 @@ class Serial:
             self._counts.connected("daemon", heard, words)
 
     def _judged(self, data: bytes, began: float) -> bytes | None:
-        """What came so far without a frame; None once it is said that it is no frame. Raises BridgeError."""
+        """Report silence, or bytes without a frame; returns None after a report, else `data`. Raises BridgeError."""
         if not data and time.monotonic() > began + SILENT_S:
             hint = "" if self._protocol.request else " (eTextile's E256 speaks only when it is asked: --protocol e256)"
             self._counts.say(f"{self._device} is open, but nothing comes{hint}")
@@ -195,7 +195,7 @@ class Serial:
 
 
 def form_of(reading: Reading) -> str:
-    """How a frame is written for the daemon: as small as holds it."""
+    """The `Form.values` in which a frame is sent: the smallest that holds it."""
     kind = reading.values.dtype
     if kind.kind == "u" and kind.itemsize <= 2:
         return f"uint{8 * kind.itemsize}"

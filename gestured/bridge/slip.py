@@ -1,4 +1,4 @@
-"""OSC packets on a serial line, framed by SLIP (RFC 1055): any sensor's, and eTextile's matrix."""
+"""OSC packets on a serial line, framed by SLIP (RFC 1055): the protocols osc-slip and e256."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from gestured.core.errors import ProtocolError
 from gestured.core.osc import Message, decode
 
 SLIP_END = b"\xc0"
-# Bytes a taxel -> what they are.
+# By bytes a taxel: the type of a blob's numbers.
 BLOB_TYPES: dict[int, np.dtype[Any]] = {1: np.dtype("u1"), 2: np.dtype(">u2"), 4: np.dtype(">f4")}
 
 
@@ -18,7 +18,7 @@ class OscSlip(Protocol):
     """OSC packets between END bytes."""
 
     def push(self, data: bytes) -> list[Reading]:
-        """A frame for each packet that holds one."""
+        """The first frame of each packet that holds any."""
         found = []
         for packet in self._ended(data, SLIP_END):
             reading = self._frame(slip_decoded(packet))
@@ -44,19 +44,19 @@ class OscSlip(Protocol):
             values = last
         else:
             return None
-        if values is None or values.size < self.taxels:  # what stands before the numbers is a counter, never a taxel
+        if values is None or values.size < self.taxels:  # numbers of another type in front are a counter, never taxels
             return None
         return reading_of([*before, *values.tolist()], self.shape, values.dtype)
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Several packets that are OSC."""
+        """Whether the bytes are several OSC packets."""
         packets = [message for each in data.split(SLIP_END)[1:-1] for message in messages_of(slip_decoded(each))]
         return f"osc-slip with messages to {packets[0].address}" if len(packets) >= FEWEST else None
 
 
 class E256(OscSlip):
-    """The e256: it is asked by OSC for each frame, and answers to `/r` with one blob of counts."""
+    """The e256: for each frame the bridge sends the OSC message `/r`, and gets one with a blob of counts."""
 
     baud = 230_400
     grid = (16, 16)
@@ -72,7 +72,7 @@ class E256(OscSlip):
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Several answers."""
+        """Whether the bytes are several answers of an e256."""
         return "e256" if len(E256(*E256.grid).push(data)) >= FEWEST else None
 
 
@@ -82,7 +82,7 @@ def slip_decoded(packet: bytes) -> bytes:
 
 
 def messages_of(packet: bytes) -> list[Message]:
-    """The OSC messages of a packet; none where it is no OSC."""
+    """The OSC messages of a packet; none if it is not OSC."""
     try:
         return decode(packet)
     except ProtocolError:

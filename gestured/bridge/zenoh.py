@@ -1,12 +1,12 @@
-"""`gestured-bridge zenoh`: gesture events to Zenoh, and with --frames a distant sensor's frames to the daemon.
+"""`gestured-bridge zenoh`: gesture events to Zenoh, and with --frames a remote sensor's frames to the daemon.
 
 gestured/{site}/{sensor}/{type}     an event in JSON as on the socket, with the daemon's `instance`
 gestured/{site}/alive               liveliness token of the daemon
 gestured/{site}/{sensor}/alive      liveliness token of a sensor that is heard
-gestured/{site}/hello               asked (get): the daemon's hello; {sensor}/gesture asked: the sensor's last gesture
+gestured/{site}/hello               answers a get with the daemon's hello; {sensor}/gesture with its last gesture
 gestured/{site}/{sensor}/frames     in: OSC packets as over UDP, with counter and time; of this sensor alone
 
-With --ros2 the events are ROS 2 topics instead, as rmw_zenoh has them: `zenoh_ros.py` says which.
+With --ros2 the events are topics of ROS 2 instead, in the form of rmw_zenoh: see `zenoh_ros.py`.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from gestured.client.program import Commands
 from gestured.client.stop import on_stop
 from gestured.client.values import sensor_name
 
-LAST_S = 1.0  # that a router may take, once the bridge was told to end: to answer its call, or its good-bye
+LAST_S = 1.0  # the longest wait for a router at the end, while the session opens or closes
 
 
 def add(commands: Commands) -> None:
@@ -70,6 +70,6 @@ def run(args: argparse.Namespace) -> int:
     finally:
         source.close()
     if not bridge.close(LAST_S):
-        # Its thread would abort the process if it came back to Python while that ends. The session ends as we do.
+        # The waiting thread would abort the process if it returned to Python while the interpreter ends.
         os._exit(0)
     return 0

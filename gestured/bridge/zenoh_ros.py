@@ -1,10 +1,10 @@
-"""`gestured-bridge zenoh --ros2`: events as topics of ROS 2, for nodes whose middleware is rmw_zenoh.
+"""`gestured-bridge zenoh --ros2`: events as topics of ROS 2, for nodes with the middleware rmw_zenoh.
 
 /gestured/{sensor}/gesture    std_msgs/String: the event in JSON as on the socket; reliable, the last 10
 /gestured/status              std_msgs/String: the daemon's `status`, or `gone`; reliable and transient local
 
-`--site NAME` puts /NAME in front. Keys, liveliness tokens and attachments are those of rmw_zenoh 0.2.4 and later, as in
-its docs/design.md and liveliness_utils.cpp; the payload is CDR. Nothing of ROS is needed on this machine.
+`--site NAME` puts /NAME in front. Keys, liveliness tokens and attachments are those of rmw_zenoh 0.2.4 and later (its
+docs/design.md and liveliness_utils.cpp); the payload is CDR. This machine needs no ROS.
 """
 
 import argparse
@@ -21,11 +21,11 @@ from gestured.bridge.options import STATUS, BridgeError
 from gestured.bridge.ros_names import token
 from gestured.bridge.zenoh_session import Zenoh
 
-STRING = "std_msgs::msg::dds_::String_"  # std_msgs/String, and below the hash of its definition
+STRING = "std_msgs::msg::dds_::String_"  # the type std_msgs/String; STRING_HASH is the hash of its definition
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
-# Quality of service as rmw_zenoh writes it: what differs from its default (reliable, volatile, the last 42).
+# Quality of service as rmw_zenoh writes it: the differences from its default (reliable, volatile, the last 42).
 LAST_TEN, LATEST = "::,10:,:,:,,", ":1:,1:,:,:,,"
-HEARTBEAT_S = 0.5  # after which a listener that missed the latest status learns of it; rmw_zenoh has the same
+HEARTBEAT_S = 0.5  # a subscriber that missed the latest status learns so within this time, as in rmw_zenoh
 MOST_DOMAIN = 232  # the largest ROS_DOMAIN_ID
 
 
@@ -33,17 +33,17 @@ class Ros(Zenoh):
     """One daemon's events as the topics of a ROS 2 node called `gestured`."""
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
-        """Raises BridgeError for what cannot be."""
+        """Raises BridgeError for arguments that cannot be used."""
         super().__init__(args, counts)
         self._domain = _domain(os.environ.get("ROS_DOMAIN_ID") or "0")
         self._namespace = f"/{token(args.site)}" if args.site else ""
         self._types = [kind for kind in args.types if kind != STATUS]
-        self._topics: dict[tuple[str, str], _Topic] = {}  # sensor, type of event -> its publisher
-        self._numbers = count(1)  # of this node's publishers
+        self._topics: dict[tuple[str, str], _Topic] = {}  # by sensor and type of event
+        self._numbers = count(1)  # the numbers of this node's publishers
         self._status: Line = _gone()
 
     def take(self, line: Line) -> None:
-        """One line of `follow`."""
+        """Take one line of `follow`."""
         super().take(line)
         if line["type"] in (STATUS, GONE):
             self._status = line if line["type"] == STATUS else _gone()
@@ -51,17 +51,17 @@ class Ros(Zenoh):
                 self._put({**self._status, "sensor": ""}, self._daemon.payload(self._status))
 
     def _serve(self, session: Any) -> None:
-        """Answer no questions: nodes of ROS 2 subscribe to topics, and ask for nothing else."""
+        """Answer no queries, since nodes of ROS 2 only subscribe to topics."""
 
     def _announce(self) -> None:
-        """Announce the node and its topics: those of a sensor before its first event, so that it has listeners then."""
+        """Announce the node and its topics; a sensor's before its first event, so that this finds subscribers."""
         if not self._topics:
             self._tokens["node"] = self._session.liveliness().declare_token(self._entity("0", "NN"))
             self._topic("", STATUS).publish(self._daemon.payload(self._status))
         for sensor in self._daemon.states:
             for kind in self._types:
                 self._topic(sensor, kind)
-        if len(self._topics) > MOST_SENSORS:  # whoever can send frames can invent names of sensors
+        if len(self._topics) > MOST_SENSORS:  # any sender of frames can invent names of sensors
             for sensor, kind in [key for key in self._topics if key[0] and key[0] not in self._daemon.states]:
                 self._topics.pop((sensor, kind)).close()
 
@@ -70,7 +70,7 @@ class Ros(Zenoh):
             self._topic(event["sensor"], event["type"]).publish(data)
 
     def _topic(self, sensor: str, kind: str) -> "_Topic":
-        """A sensor's topic; the one without a sensor is the status."""
+        """The topic for a type of event of a sensor, made if it is new; without a sensor, that of the status."""
         if (sensor, kind) not in self._topics:
             path = "/".join((self._namespace, "gestured", *([token(sensor)] if sensor else []), kind))
             quality = LAST_TEN if sensor else LATEST
@@ -105,12 +105,12 @@ class _Topic:
         else:
             self._publisher = session.declare_publisher(key, reliability=zenoh.Reliability.RELIABLE)
         self._token = session.liveliness().declare_token(entity)
-        # A publisher's identity may be any 16 bytes that no other has; rmw_zenoh takes XXH3, which Python lacks.
+        # A publisher's identity may be any 16 bytes that no other has; rmw_zenoh uses XXH3, which Python lacks.
         self._identity = hashlib.blake2b(entity.encode(), digest_size=16).digest()
         self._count = 0
 
     def publish(self, text: bytes) -> None:
-        """Publish a text in UTF-8: CDR in little-endian order, its length, the text, and a zero."""
+        """Publish a text in UTF-8 as little-endian CDR: its length, the text, and a zero byte."""
         self._count += 1
         attachment = struct.pack("<qqB", self._count, time.time_ns(), len(self._identity)) + self._identity
         data = struct.pack("<4sI", b"\x00\x01\x00\x00", len(text) + 1) + text + b"\x00"

@@ -1,4 +1,4 @@
-"""What the bridge to Zenoh does while it runs: one daemon's events, and what is known of it, in one Zenoh session."""
+"""A session of the Zenoh bridge: it publishes one daemon's events and liveliness, and answers queries about them."""
 
 import argparse
 import json
@@ -14,50 +14,50 @@ from gestured.bridge.daemon import MOST_SENSORS, OLD_S, Daemon, Line
 from gestured.bridge.forward import Forward
 from gestured.bridge.options import FIRST_S, LONGEST_S, BridgeError, host_name
 
-ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
-CLIENT = '"client"'  # the mode of a session that calls a router; any other one may be called
-# What holds unless --config says otherwise: nobody is looked for on the network.
+ROUTER = "tcp/127.0.0.1:7447"  # the default address of a router on this machine
+CLIENT = '"client"'  # the mode of a session that connects to a router; in other modes, others may connect to it
+# Settings unless --config has them: no search for peers on the network.
 UNLESS_SAID = {"mode": "client", "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
-ALWAYS = {"transport/shared_memory/enabled": False}  # the unit's filter denies it, and then Zenoh opens no session
-HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
+ALWAYS = {"transport/shared_memory/enabled": False}  # Zenoh opens no session if the systemd unit denies this to it
+HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # the states of sensors whose frames come
 
 
 class Zenoh:
-    """One daemon's events, and what is known of it, on Zenoh."""
+    """One daemon's events and liveliness on Zenoh."""
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
-        """Raises BridgeError for what cannot be."""
+        """Raises BridgeError for arguments that cannot be used."""
         import zenoh
 
-        zenoh.init_log_from_env_or("off")  # what is wrong is said here, in one line
+        zenoh.init_log_from_env_or("off")  # the bridge logs errors itself, in one line
         self._site = args.site or host_name(None)
         self._config = _configuration(args)
-        self._is_called = self._config.get_json("mode") != CLIENT  # nobody has to be there
+        self._is_called = self._config.get_json("mode") != CLIENT  # then nobody has to be there
         self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._counts = counts
         self._forward = Forward(self._key(), args.to, counts) if args.frames else None
         self._session: Any = None
         self._tokens: dict[str, Any] = {}
-        self._holding = threading.Lock()  # for what is announced: the thread that opens the session does it first
-        self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
+        self._holding = threading.Lock()  # guards the tokens, which the thread that opens the session announces first
+        self._latest: dict[str, bytes] = {}  # by sensor: its last gesture, as published
         self._closed = threading.Event()
         self._opening = threading.Thread(target=self._open, name="zenoh", daemon=True)
 
     def begin(self) -> None:
-        """Reach the router, in a thread of its own."""
+        """Begin to open the session, in a thread of its own."""
         self._opening.start()
 
     def take(self, line: Line) -> None:
-        """One line of `follow`."""
+        """Take one line of `follow`."""
         self._daemon.take(line)
-        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
+        if "sensor" in line:  # an event, which the daemon has filtered already
             self._publish(line)
         self._keep_up()
 
     def close(self, patience_s: float | None = None) -> bool:
-        """Leave the network: tell it that this session ends.
+        """Close the session, so that the network knows that it has ended.
 
-        False where Zenoh still waits for a router that says nothing, after so many seconds; None waits for its end.
+        Returns False if Zenoh still waits for a silent router after `patience_s` seconds (None: wait until it is done).
         """
         self._closed.set()
         if self._forward is not None:
@@ -77,7 +77,7 @@ class Zenoh:
                 self._session.close()
 
     def _open(self) -> None:
-        """Open a session: a router that is not there yet is waited for, and later Zenoh connects again by itself."""
+        """Open the session as soon as a router is there; after that Zenoh connects again by itself."""
         import zenoh
         from zenoh.handlers import Callback
 
@@ -85,7 +85,7 @@ class Zenoh:
         while not self._closed.is_set():
             try:
                 session = zenoh.open(self._config)
-            except BaseException as error:  # noqa: BLE001 - a panic, as without descriptors, is no `Exception`
+            except BaseException as error:  # noqa: BLE001 - a panic, such as for want of descriptors, is no `Exception`
                 words = f"Zenoh cannot be reached: {_first_words(error)}; trying again"
                 self._counts.connected("zenoh", False, words)
                 self._closed.wait(pause)
@@ -100,10 +100,10 @@ class Zenoh:
             return
 
     def _serve(self, session: Any) -> None:
-        """Answer what latecomers ask."""
+        """Begin to answer queries."""
         from zenoh.handlers import Callback
 
-        # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
+        # Zenoh's own threads call `_answer`: a Python thread that waits for Zenoh would abort the process at its exit.
         self._answers = session.declare_queryable(self._key("**"), Callback(self._answer, indirect=False))
 
     def _publish(self, event: Line) -> None:
@@ -127,7 +127,7 @@ class Zenoh:
         self._session.put(key, data, encoding=zenoh.Encoding.APPLICATION_JSON)
 
     def _reached(self) -> bool:
-        """Whether a router or a peer is there now; said where that changes."""
+        """Whether a router or a peer is there now; a change is logged."""
         if self._session is None:
             return False
         info = self._session.info
@@ -136,7 +136,7 @@ class Zenoh:
         return there
 
     def _keep_up(self) -> None:
-        """Tell Zenoh what is there now, and say once that all is."""
+        """Announce what is there now, and print once that the bridge works."""
         if self._session is None:
             return
         with self._holding:
@@ -145,7 +145,7 @@ class Zenoh:
             self._counts.ready(site=self._site)
 
     def _announce(self) -> None:
-        """Hold a token for the daemon and for each sensor that is heard now."""
+        """Hold a liveliness token for the daemon and for each sensor in a state of HEARD, and for nothing else."""
         alive = set()
         if self._daemon.hello:
             heard = (name for name, state in self._daemon.states.items() if state in HEARD)
@@ -156,7 +156,7 @@ class Zenoh:
             self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def _answer(self, query: Any) -> None:
-        """What a latecomer asks for; called by Zenoh in a thread of its own."""
+        """Answer a query with the hello and last gestures that it matches; Zenoh calls this in a thread of its own."""
         hello = dict(self._daemon.hello)
         if hello:
             known = {"gestures": self._daemon.gestures, "states": self._daemon.states}
@@ -175,7 +175,7 @@ class Zenoh:
 
 
 def _configuration(args: argparse.Namespace) -> Any:
-    """Zenoh's own, from the flags. Raises BridgeError."""
+    """Zenoh's configuration, from the flags. Raises BridgeError."""
     import zenoh
 
     where, expected = f"--config {args.config}", "expected Zenoh's configuration (JSON5)"
@@ -194,5 +194,5 @@ def _configuration(args: argparse.Namespace) -> Any:
 
 
 def _first_words(error: BaseException) -> str:
-    """What Zenoh says, without the place in its sources."""
+    """The first line of Zenoh's error, without the place in its sources."""
     return re.sub(r" at /\S+\.rs:\d+\.?", "", str(error).partition("\n")[0])[:300].strip(" .!")
