@@ -1,12 +1,12 @@
 """A simulator of people, fingers, a textile and its sensor, in plain numpy.
 
-What it is: human strokes in continuous time (`perform`), a soft matrix sensor that samples, blurs, leaks,
-lags and quantises them (`SimulatedSensor.record`), and seeded collections of both (`cohort_take`, `wide`, `session`).
-What it is not: a finite-element model of a fabric, nor fitted to textile recordings (none were at hand). Its
-distributions are invented within plausible bounds; blob sizes, durations and speeds were compared with real
-fingers on a touchscreen only. A figure measured on it is a figure about it.
-Everything is drawn from PCG64 on SeedSequences and ends in integer counts: the same seed gives the same
-takes.
+It has human strokes in continuous time (`perform`), a soft matrix sensor that samples, blurs, leaks, lags and quantises
+them (`SimulatedSensor.record`), and seeded collections of takes (`cohort_take`, `wide`, `session`). It is no
+finite-element model of fabric, and is not fitted to textile recordings (none were at hand). Its distributions are
+invented within plausible bounds; only blob sizes, durations and speeds were compared with real fingers, which touched a
+touchscreen. A figure that is measured on the simulator is a figure about the simulator.
+
+All random numbers come from PCG64 with SeedSequences, and frames are integers, so the same seed gives the same takes.
 """
 
 from gestured.simulator.cohort import (

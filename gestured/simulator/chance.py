@@ -1,9 +1,9 @@
-"""Everyday life as chance would draw it: any patch on any way with any course of force, for a moment or for a while.
+"""Everyday life by chance: patches of any size on any way with any course of force, for a moment or for a while.
 
-`places` draws things that somebody thought of, and a model that has learned one author's drawings knows those drawings
-and less of the things. Here no thing is drawn: whatever number a contact has comes from the widest range that a body or
-a thing can leave on a pad, independent of its other numbers. Contacts that are gestures in truth are left out: a lone
-narrow patch stays for longer than a tap, and goes no further than one.
+`places` draws things that its author thought of, and a model that learns from them knows these drawings better than the
+things. Here no thing is drawn: each number of a contact comes from the widest range that a body or a thing can cause on
+a pad, independent of the other numbers. Contacts that would be gestures are left out: one or two narrow patches stay
+for longer than a tap, and go no further than a tap does.
 """
 
 import math
@@ -19,7 +19,7 @@ from gestured.simulator.places import PLACES, Place
 from gestured.simulator.resting import NOBODY, STEP_S
 from gestured.simulator.unmeant import Places, even
 
-NARROW_MM = 6.5  # a patch that is no longer may be a finger
+NARROW_MM = 6.5  # a patch that is not longer may be a finger
 MOMENTS = {"armrest": 150.0, "door": 150.0, "seat": 120.0, "skin": 170.0, "table": 150.0}  # an hour; assumed
 LIES_S = 25.0  # median dwell time; assumed
 
@@ -31,7 +31,7 @@ def _size(occasion: Occasion, low: float, high: float) -> tuple[float, float]:
 
 
 def _course(occasion: Occasion, t: Array) -> Array:
-    """(n,) force over time, 0 at both ends: any rise and fall, a tilted plateau, unrest, stick and slip."""
+    """The force (n,), 0 at both ends: any rise and fall, a tilted plateau, unrest, stick and slip."""
     rng, total = occasion.rng, float(t[-1])
     up, down = (float(rng.uniform(0.02, 0.9)) * total for _ in range(2))
     up, down = (max(share * min(1.0, total / (up + down)), 0.01) for share in (up, down))
@@ -48,7 +48,7 @@ def _course(occasion: Occasion, t: Array) -> Array:
 
 
 def _way(occasion: Occasion, t: Array, small: float) -> tuple[Array, Array]:
-    """(n,) and (n,) mm from where it lands: it stays, passes, bends, goes to and fro, or wanders."""
+    """x, y (n,) in mm from the place of landing: a contact stays, passes, bends, goes to and fro, or wanders."""
     rng, u = occasion.rng, t / t[-1]
     heading, kind = float(rng.uniform(-math.pi, math.pi)), int(rng.integers(6))
     reach = small * even(occasion, 0.02, 1.6)
@@ -73,7 +73,7 @@ def _way(occasion: Occasion, t: Array, small: float) -> tuple[Array, Array]:
 
 
 def anything(occasion: Occasion) -> list[Press]:
-    """One to five patches, together or one after the other, once to four times."""
+    """One to five patches, which move together or each by itself, once to four times."""
     rng, small = occasion.rng, occasion.small
     count = int(rng.choice([1, 2, 3, 4, 5], p=[0.5, 0.2, 0.15, 0.1, 0.05]))
     sizes = [_size(occasion, 2.5, 32.0) for _ in range(count)]
@@ -102,7 +102,7 @@ def anything(occasion: Occasion) -> list[Press]:
 
 
 def lies(occasion: Occasion, seconds: float, _: float) -> tuple[list[Press], Places]:
-    """One to six patches that lie, some with their breath, shifts and lifts; fingertips may play beside them."""
+    """One to six patches that lie for `seconds`, with unrest, shifts and lifts or still; fingertips may play nearby."""
     rng, small = occasion.rng, occasion.small
     t = np.linspace(0.0, seconds, max(8, math.ceil(seconds / STEP_S) + 1))
     cx, cy = (float(rng.uniform(-0.15, 1.15)) * side for side in (occasion.width, occasion.height))
@@ -149,7 +149,7 @@ def _play(occasion: Occasion, seconds: float, cx: float, cy: float) -> list[Pres
 
 
 def _by_chance(place: Place) -> Place:
-    """The same place, as long without anybody, and with as many gestures that are meant."""
+    """The same place with contacts by chance, as much time without anybody, and as many meant gestures."""
     nobody = place.postures[NOBODY]
     return replace(
         place,

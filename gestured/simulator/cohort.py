@@ -1,7 +1,7 @@
-"""Takes and sessions: one gesture, many gestures, the cohort of 3060, the endless wide stream.
+"""Takes and sessions: one gesture, many gestures, the cohort of 3060 takes, and the endless wide stream.
 
-Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordinates), so any part can be
-made alone and in parallel.
+Each take has a random generator of its own, seeded with the take's coordinates, so any part can be made alone and in
+parallel.
 """
 
 from collections.abc import Iterable, Iterator
@@ -26,14 +26,14 @@ from gestured.simulator.sensor import SimulatedSensor, Take
 from gestured.simulator.variety import any_sensor
 
 GESTURES: tuple[str, ...] = tuple(TEN)
-# Gestures one right after the other: read as such, not as none.
+# Gestures right after one another may be recognised as such, so these kinds are not among NON_GESTURES.
 SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")
 NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQUENCES)
 NONE = "none"
-OTHERS_SHARE = 0.35  # of the wide stream that is none of the ten gestures
-LEAD_S, TAIL_S = 1.3, 0.8  # of an idle pad around a single performance, the first plus up to one frame
-LAST_PAUSE_S = 1.0  # of an idle pad at least at the end of a session
-FLICKS = 0.25  # share of the hardest takes in which strokes are hurried, down to two to four frames
+OTHERS_SHARE = 0.35  # share of the wide stream that is none of the ten gestures
+LEAD_S, TAIL_S = 1.3, 0.8  # the pad is idle so long before (plus up to one frame) and after a single performance
+LAST_PAUSE_S = 1.0  # the pad is idle for so long at least at the end of a session
+FLICKS = 0.25  # share of the hardest takes in which strokes are hurried, so that some last two to four frames
 
 
 def perform(
@@ -70,7 +70,7 @@ def performed(
     extent: tuple[float, float],
     hurry: float = 1.0,
 ) -> Performance:
-    """What one person makes once, by a function such as TEN and OTHERS hold; a gesture where `kind` is in TEN."""
+    """One performance by a maker such as those in TEN and OTHERS; it is labelled as a gesture if `kind` is in TEN."""
     turn, grow, press = participant.pose(inclination)
     rate = participant.rate(rng, speed) * hurry
     made = make(Occasion(rng, participant, *extent, speed, rate, turn + participant.bias, grow, press))
@@ -95,13 +95,13 @@ def gesture_take(
 
 
 def recorded(performance: Performance, sensor: SimulatedSensor, rng: np.random.Generator) -> Take:
-    """What a sensor sends of one performance, with an idle pad before and after it."""
+    """The take of one performance, with an idle pad before and after it."""
     start = LEAD_S + float(rng.random()) / sensor.rate_hz
     return sensor.record([(start, performance)], start + performance.duration_s + TAIL_S, rng)
 
 
 def at_random(rng: np.random.Generator, non_gesture_share: float) -> Iterator[str]:
-    """Kinds without end: gestures, and in that share of cases non-gestures."""
+    """Random kinds without end: gestures, and a share of non-gestures."""
     while True:
         pool = NON_GESTURES if rng.random() < non_gesture_share else GESTURES
         yield pool[int(rng.integers(len(pool)))]
@@ -118,9 +118,9 @@ def session(
     lead_s: float = 2.0,
     speed: str | None = None,
 ) -> Take:
-    """A continuous recording of that many seconds: performances in random order with idle gaps between them.
+    """A continuous recording of that many seconds: performances in random order with idle gaps of `idle_s` between.
 
-    With `kinds` exactly those are performed, in that order, as far as the time reaches; with `speed` all at that one.
+    `kinds`, if given, are performed in their order as far as the time allows; `speed`, if given, is that of all.
     """
     performances: list[tuple[float, Performance]] = []
     inclination = int(rng.integers(3))
@@ -166,7 +166,7 @@ def cohort_take(trial: Trial, seed: int = 0) -> Take:
 
 @dataclass(frozen=True)
 class WideTake:
-    """What a take of the wide stream is of, before it is performed; `rng` goes on with the performance."""
+    """The plan of a take of the wide stream; the performance continues with the state of `rng`."""
 
     kind: str
     participant: Participant
@@ -178,7 +178,7 @@ class WideTake:
 
 
 def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
-    """What `wide` will perform; a thousandth of its work."""
+    """The plan of the take that `wide` makes, for a thousandth of the work."""
     rng = generator(seed, 0x71DE, index)
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
@@ -190,9 +190,9 @@ def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
 
 
 def wide(seed: int, index: int, hardness: float | None = None) -> Take:
-    """The index-th take of an endless stream: a random participant on a random sensor.
+    """The take of that index in an endless stream: a random participant on a random sensor.
 
-    `hardness` is drawn from 0..1 for each take unless it is given.
+    `hardness` (0..1, as in `any_sensor`) is random for each take unless it is given.
     """
     plan = wide_plan(seed, index, hardness)
     return gesture_take(
@@ -201,5 +201,5 @@ def wide(seed: int, index: int, hardness: float | None = None) -> Take:
 
 
 def _person(seed: int, number: int) -> int:
-    """The integer behind participant `number` of cohort `seed`."""
+    """The seed of participant `number` of cohort `seed`."""
     return seed * 1000 + number

@@ -1,4 +1,4 @@
-"""Lines that one finger draws and that are none of the ten gestures."""
+"""Lines drawn with one finger that are none of the ten gestures."""
 
 import math
 
@@ -12,7 +12,7 @@ from gestured.simulator.people import Press
 
 
 def drawn(occasion: Occasion, t: Array, x: Array, y: Array) -> list[Press]:
-    """One finger along a path, settled on the pad, as unsteady as this hand is."""
+    """One finger along a path (mm) that is moved onto the pad, with this person's unsteadiness."""
     x, y = occasion.settle(x, y)
     sway = 0.7 * occasion.person.wobble_mm * min(1.0, occasion.small / 60.0)
     x = x + sway * wander(t, occasion.rng, 0.4, 3.0, 3)
@@ -26,19 +26,19 @@ def _turned(points: list[tuple[float, float]], angle: float) -> list[tuple[float
 
 
 def _leg_s(occasion: Occasion, length: float) -> float:
-    """A duration for one leg of that many millimetres, in seconds."""
+    """The duration in seconds of one leg of `length` millimetres."""
     return float(np.clip(0.3 * (length / 40.0) ** 0.4 / occasion.rate * occasion.rng.lognormal(0.0, 0.15), 0.11, 0.9))
 
 
 def _legs(occasion: Occasion, points: list[tuple[float, float]], overlap: float, pause_s: float = 0.0) -> list[Press]:
-    """One finger through via points."""
+    """One finger through via points (mm), with legs that overlap or pause as in `polyline`."""
     legs = [_leg_s(occasion, math.dist(a, b)) for a, b in zip(points[:-1], points[1:], strict=True)]
     t, x, y = polyline(points, legs, overlap, pause_s)
     return drawn(occasion, t, x, y)
 
 
 def scribble(occasion: Occasion) -> list[Press]:
-    """A wild line through five to thirteen places."""
+    """A wild line through six to thirteen places."""
     rng = occasion.rng
     size = occasion.small * rng.uniform(0.25, 0.8)
     points = [(float(a), float(b)) for a, b in rng.uniform(-0.5, 0.5, (int(rng.integers(6, 14)), 2)) * size]
@@ -55,7 +55,7 @@ def zigzag(occasion: Occasion) -> list[Press]:
 
 
 def check_mark(occasion: Occasion) -> list[Press]:
-    """A short stroke down to the right and a longer one up to the right (or as left-handers draw it)."""
+    """A short stroke down to the right and a longer one up to the right, or mirrored, as left-handers draw it."""
     rng = occasion.rng
     size = occasion.small * rng.uniform(0.3, 0.8)
     short, tall = size * rng.uniform(0.3, 0.55), size
@@ -80,7 +80,7 @@ def corner(occasion: Occasion) -> list[Press]:
 
 
 def back_and_forth(occasion: Occasion) -> list[Press]:
-    """A swipe that comes back, once or several times."""
+    """A swipe that goes to and fro, in two to five legs."""
     rng = occasion.rng
     length = occasion.small * rng.uniform(0.3, 0.8)
     points = [(0.0, 0.0)]
@@ -90,7 +90,7 @@ def back_and_forth(occasion: Occasion) -> list[Press]:
 
 
 def wave(occasion: Occasion) -> list[Press]:
-    """A wavy line: one to three periods of a sine along any direction, clearly swinging."""
+    """A wavy line in any direction: one to three periods of a sine with a clear amplitude."""
     rng = occasion.rng
     periods, length = rng.uniform(1.0, 3.0), occasion.small * rng.uniform(0.5, 0.9)
     t = grid(float(np.clip(0.55 * (1.0 + periods) / occasion.rate * rng.lognormal(0.0, 0.15), 0.4, 3.0)))
@@ -112,7 +112,7 @@ def arc(occasion: Occasion) -> list[Press]:
 
 
 def figure_eight(occasion: Occasion) -> list[Press]:
-    """A lying or standing eight, once or one and a half times."""
+    """A lying or standing eight, 0.9 to 1.5 times."""
     rng = occasion.rng
     move = float(np.clip(1.5 / occasion.rate * rng.lognormal(0.0, 0.15), 0.8, 4.0))
     t = grid(move)
@@ -123,7 +123,7 @@ def figure_eight(occasion: Occasion) -> list[Press]:
 
 
 def spiral(occasion: Occasion) -> list[Press]:
-    """Two or more turns while the radius grows or shrinks to a third."""
+    """Two or three turns, while the radius grows or shrinks by a factor of three or more."""
     rng = occasion.rng
     turns = rng.uniform(1.9, 3.2)
     move = float(np.clip(0.75 * turns / occasion.rate * rng.lognormal(0.0, 0.15), 1.0, 5.0))
@@ -138,7 +138,7 @@ def spiral(occasion: Occasion) -> list[Press]:
 
 
 def rubbing(occasion: Occasion) -> list[Press]:
-    """Rubbing round and round, two to five turns on one spot."""
+    """Two to five turns on one spot, as if rubbing."""
     rng = occasion.rng
     turns = rng.uniform(2.0, 5.0)
     move = float(np.clip(0.55 * turns / occasion.rate, 0.9, 4.0))

@@ -1,11 +1,11 @@
-"""Everyday life on a sensor as a process in time: what rests, shifts, brushes and lies about, and what is meant.
+"""Everyday life on a sensor as a process in time: what rests there, what else happens, and which gestures are meant.
 
 A day is drawn for a place and a person. Postures follow one another, each for a while: an arm, an elbow, a hand, a body
-that leans, a thing that lies there, nobody. Whatever rests breathes, is re-seated now and then, and is shaken by the
-road. Beside that, things happen at rates an hour: sleeves, wiping, bumps, things put down, fingers that play. Gestures
-are meant at known times: after quiet, soon after something has left, or beside what rests and does not cover them.
+that leans, a thing that lies there, nobody. Whatever rests breathes, shifts now and then, and is shaken by the road.
+Beside that, things happen at hourly rates: sleeves, wiping, bumps, things put down, fingers that play. Gestures are
+meant at known times: after quiet, soon after something has left, or beside something that rests.
 
-`places` says what rests and happens where. `chance` says the same without any idea of the things.
+`places` says what rests and happens at each place; `chance` does so with random patches in place of things.
 """
 
 import math
@@ -23,27 +23,27 @@ from gestured.simulator.resting import NOBODY
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
 from gestured.simulator.unmeant import PLAYED, Places
 
-TAP_S = 0.3  # what is longer is no tap, whatever was meant (99.7 % of intended touches: Matero and Colley, DIS 2012)
+TAP_S = 0.3  # a longer contact is no tap (99.7 % of intended touches are shorter: Matero and Colley, DIS 2012)
 TAP_TRAVEL = 0.15  # of the pad's shorter side
-APART_S = 0.3  # a gesture that is meant keeps so far from the next thing that the same hand does
-COVERS = 1.6  # standard deviations around the middle of what rests: nobody aims a gesture at a place under an arm
-AIMS = 6  # places that a person looks for beside what rests, before the gesture is given up; assumed
-FREE_S = (3.0, 6.0)  # a sensor is switched on before somebody lies on it; what is learned with a hand is no idle sensor
-SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
+APART_S = 0.3  # a meant gesture keeps so far in time from anything else that the same hand does
+COVERS = 1.6  # standard deviations around the middle of what rests; nobody aims a gesture at a place under an arm
+AIMS = 6  # places that a person tries beside what rests before the gesture is given up; assumed
+FREE_S = (3.0, 6.0)  # nothing rests on the sensor at first, so that the idle sensor can be learned
+SOON = 0.12  # share of departures after which a gesture is meant within a second; assumed
 AFTER_WAKE_S = (0.8, 2.0)  # from the gesture that wakes a sensor to the one that is meant; assumed
-HABIT = 0.6  # standard deviation of the logarithm of how often a person does each thing, beside the rate; assumed
+HABIT = 0.6  # standard deviation of the logarithm of a person's own factor on each rate; assumed
 
 
 @dataclass(frozen=True)
 class Day:
-    """What a sensor sent for a while, and what really happened; `take.events` are in the order of their onsets."""
+    """A sensor's take of everyday life, and what really happened; `take.events` are in the order of their onsets."""
 
     place: str
     person: int
     take: Take
-    contacts: int  # that nobody meant
+    contacts: int  # number of contacts that nobody meant
     meant: tuple[tuple[Act, str], ...]  # gestures, each with what lay on the sensor (`NOTHING`, `LEFT` or a posture)
-    like: tuple[Act, ...]  # contacts that are a tap in truth, though nobody meant one
+    like: tuple[Act, ...]  # contacts that are like a tap, though nobody meant one
 
 
 NOTHING, LEFT = "nothing", "just left"
@@ -52,7 +52,7 @@ NOTHING, LEFT = "nothing", "just left"
 def day(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> Day:
     """So many seconds of everyday life at a place; the same for the same seed.
 
-    With `wake`, a gesture, everybody makes that one before each gesture that is meant: both stand in `Day.meant`.
+    If `wake` names a gesture, the person makes it before each meant gesture; both are in `Day.meant`.
     """
     plan = planned(seed, place, seconds, sensor, wake)
     everything = sorted([*plan.life, *((at, made) for at, made, _ in plan.meant)], key=lambda one: one[0])
@@ -64,7 +64,7 @@ def day(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None 
 
 
 def planned(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> "Plan":
-    """What happens in `day`, before any sensor sees it: a fraction of its work."""
+    """The plan of `day`, without the take of a sensor, for a fraction of the work."""
     rng = generator(seed, 0xDA1, *map(ord, place.name))
     person = Participant(int(rng.integers(1 << 40)) + 2_000_000)
     lived = _Life(place, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds, wake)
@@ -87,7 +87,7 @@ class _Life:
     wake: str
 
     def unmeant(self) -> Iterator[Happening]:
-        """What nobody means: postures one after the other, and what happens beside them."""
+        """What nobody means as gestures: postures one after the other, and what happens beside them."""
         names, now = list(self.where.postures), float(self.rng.uniform(*FREE_S))
         chances = np.array([self.where.postures[name] for name in names])
         playing, free = self._habits(FINGERS), [(0.0, now)]
@@ -109,13 +109,13 @@ class _Life:
                     yield at, self._happen(kind, self.where.happenings.get(kind))
 
     def _habits(self, rates: Mapping[str, float]) -> dict[str, float]:
-        """How often this person does each thing, an hour; over all people as often as `rates` say."""
+        """How often an hour this person does each thing; the mean over all people is in `rates`."""
         return {kind: rate * float(self.rng.lognormal(-0.5 * HABIT**2, HABIT)) for kind, rate in rates.items()}
 
     def meant(self, life: list[Happening]) -> Iterator[tuple[float, Performance, str]]:
-        """Gestures that somebody means with a free hand, each with what lay on the sensor.
+        """(start in s, gesture, what lay on the sensor) of each gesture that is meant with a free hand.
 
-        Nothing else that moves is in their time, and nothing that rests covers their way.
+        Nothing else moves during such a gesture, and nothing that rests covers its way.
         """
         resting = [(at, at + one.duration_s, one) for at, one in life if one.kind in self.where.rests]
         moving = [(at, at + one.duration_s) for at, one in life if one.kind not in self.where.rests]
@@ -140,9 +140,9 @@ class _Life:
                 yield from ((at + after, one, lay) for after, one in made)
 
     def _beside(self, at: float, life: list[Happening], under: list[Performance]) -> list[Happening] | None:
-        """A gesture whose way nothing that rests covers, after the one that wakes the sensor where there is such.
+        """A gesture whose way nothing that rests covers, after the `wake` gesture, if any; starts count from `at`.
 
-        None where this person finds no place for them.
+        None if this person finds no place for it.
         """
         kind = GESTURES[int(self.rng.integers(len(GESTURES)))]
         began = {id(one): start for start, one in life} if under else {}
@@ -165,19 +165,19 @@ class _Life:
         return None
 
     def _times(self, rate: float, seconds: float) -> list[float]:
-        """Moments of a Poisson process of so many an hour, in order."""
+        """The moments (s) of a Poisson process with that rate an hour, in order."""
         count = int(self.rng.poisson(rate * seconds / 3600.0))
         return [float(at) for at in np.sort(self.rng.uniform(0.0, seconds, count))]
 
     def _happen(self, kind: str, make: Maker | None) -> Performance:
-        """One short thing: what `make` makes, or one of the simulator's non-gestures."""
+        """One performance: by `make`, or one of the simulator's non-gestures."""
         speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
         if make is not None:
             return performed(kind, make, self.person, self.rng, speed, inclination, self.sensor.extent)
         return perform(kind, self.person, self.rng, speed, inclination, self.sensor.extent)
 
     def _rest(self, name: str, seconds: float) -> tuple[Performance, Places]:
-        """Something that rests for a while; and, of a hand, where its fingers lie."""
+        """Something that rests for a while, and where a hand's fingers lie (mm)."""
         places: list[Places] = []
 
         def make(occasion: Occasion) -> list[Press]:
@@ -190,7 +190,7 @@ class _Life:
 
 @dataclass(frozen=True)
 class Plan:
-    """What happens on a day: what nobody means, and what somebody does, each gesture with what lies on the sensor."""
+    """What happens on a day: what nobody means (`life`), and the gestures, each with what lies on the sensor."""
 
     of: _Life
     life: list[Happening]
@@ -198,9 +198,9 @@ class Plan:
 
 
 def _covers(since: float, rest: Press, press: Press) -> bool:
-    """Whether any of a finger's way lies under what has rested for so many seconds when the finger lands.
+    """Whether a finger's way comes within COVERS standard deviations of the middle of what rests.
 
-    That is within `COVERS` standard deviations of the middle of what rests.
+    `since`: for how many seconds that has rested at the finger's time 0.
     """
     then = press.t + since
     dx, dy = press.x - np.interp(then, rest.t, rest.x), press.y - np.interp(then, rest.t, rest.y)
@@ -218,7 +218,7 @@ def _touches(one: Performance) -> int:
 
 
 def _like_a_tap(start: float, one: Performance, everything: list[Happening], sensor: SimulatedSensor) -> bool:
-    """Whether a contact is a tap in truth: one finger, 0.3 s at most, within a tap's travel, nothing else touched."""
+    """Whether a contact is like a tap: one finger for at most TAP_S, within TAP_TRAVEL, and nothing else meanwhile."""
     if len(one.contacts) != 1 or not one.contacts[0].finger or one.duration_s > TAP_S:
         return False
     way = math.hypot(np.ptp(one.contacts[0].x), np.ptp(one.contacts[0].y))

@@ -1,4 +1,4 @@
-"""The ten gestures: a function for each, from an occasion to the contacts a person makes."""
+"""The ten gestures: for each a function from an occasion to the contacts that a person makes."""
 
 import math
 from collections.abc import Callable
@@ -15,13 +15,13 @@ RIGHT, UP, LEFT, DOWN = 0.0, math.pi / 2, math.pi, -math.pi / 2
 
 
 def one_tap(occasion: Occasion) -> list[Press]:
-    """One finger for 40 to 350 ms, anywhere."""
+    """One finger for 40 to 450 ms, anywhere."""
     x, y = occasion.spot(3.0, 3.0)
     return [touch_down(occasion, x, y, occasion.tap_s())]
 
 
 def double_tap(occasion: Occasion) -> list[Press]:
-    """Two taps 80 to 400 ms apart at about one place, unequal in force and duration."""
+    """Two taps 80 to 420 ms apart at about the same place, unequal in force and duration."""
     rng = occasion.rng
     x, y = occasion.spot(3.0, 3.0)
     first, gap = occasion.tap_s(), occasion.gap_s()
@@ -33,7 +33,7 @@ def double_tap(occasion: Occasion) -> list[Press]:
 
 
 def swipe(heading: float, count: int = 1) -> Callable[[Occasion], list[Press]]:
-    """A stroke towards `heading` with `count` fingers side by side."""
+    """A maker of strokes towards `heading` (radians) with `count` fingers side by side."""
 
     def performed(occasion: Occasion) -> list[Press]:
         # Several fingers side by side keep their direction better than one.
@@ -47,7 +47,7 @@ def swipe(heading: float, count: int = 1) -> Callable[[Occasion], list[Press]]:
 
 
 def circle(sense: float) -> Callable[[Occasion], list[Press]]:
-    """A circle of 270 to 450 degrees; `sense` +1 counter-clockwise, -1 clockwise as the person sees it."""
+    """A maker of circles of 270 to 450 degrees; `sense` is 1 for counter-clockwise and -1 for clockwise."""
 
     def performed(occasion: Occasion) -> list[Press]:
         rng, person = occasion.rng, occasion.person
@@ -59,7 +59,7 @@ def circle(sense: float) -> Callable[[Occasion], list[Press]]:
         tau = np.clip((t - before) / move, 0.0, 1.0)
         first = rng.normal(math.pi / 2, 0.9) if rng.random() < 0.55 else rng.uniform(-math.pi, math.pi)
         phase = first + sense * total * turning(tau, rng)
-        # It does not close, and it has the corners of an egg or a rounded triangle.
+        # A real circle does not close, and is somewhat like an egg or a rounded triangle.
         egg = rng.uniform(0.0, 0.09) * np.cos(int(rng.integers(2, 4)) * phase + rng.uniform(0.0, 6.3))
         size = radius * (1.0 + rng.normal(0.0, 0.12) * (tau - 0.5) * 2.0 + egg)
         x, y = ellipse(phase, size, rng.uniform(1.0, 1.6), rng.uniform(0.0, math.pi))

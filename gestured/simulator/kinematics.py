@@ -1,9 +1,9 @@
-"""How fingers move: speed profiles and paths, sampled on a fine time grid.
+"""The movement of fingers: speed profiles and paths, sampled on a fine time grid.
 
-Sources: minimum jerk (Flash & Hogan 1985), lognormal speed of rapid strokes (Plamondon 1995,
-sigma-lognormal), overlapping submovements that add up (Flash & Henis 1991), the two-thirds power law on
-curved paths (Lacquaniti, Terzuolo & Viviani 1983). An ellipse that is run through with a constant rate of its
-parameter obeys the two-thirds law exactly, so the circles below need no other device.
+Sources: minimum jerk (Flash & Hogan 1985), lognormal speed of rapid strokes (Plamondon 1995, sigma-lognormal),
+overlapping submovements that add up (Flash & Henis 1991), the two-thirds power law on curved paths (Lacquaniti,
+Terzuolo & Viviani 1983). An ellipse whose parameter changes at a constant rate obeys the two-thirds law exactly, so
+circles need no speed profile of their own.
 
 Lengths are millimetres, x to the right, y upward, times seconds, angles radians (counter-clockwise positive).
 """
@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 N = TypeVar("N", float, Array)
-PATH_STEP_S = 0.004  # fine time grid: 250 Hz, ten steps within the fastest rise of a tap
+PATH_STEP_S = 0.004  # fine time grid: 250 Hz, four steps within the fastest rise of a tap
 
 
 def grid(duration_s: float) -> Array:
-    """Times 0 .. duration (n,), about PATH_STEP_S apart; both ends are included and n >= 5."""
+    """Times (n,) from 0 to the duration, both included, about PATH_STEP_S apart; n >= 5."""
     return np.linspace(0.0, duration_s, max(5, math.ceil(duration_s / PATH_STEP_S) + 1))
 
 
@@ -32,14 +32,14 @@ def minimum_jerk(tau: Array) -> Array:
 
 
 def normal_cdf(z: Array) -> Array:
-    """The normal distribution function (tanh form, error below 3e-4: a hundredth of a millimetre here)."""
+    """The normal distribution function, as a tanh whose error is below 3e-4 (here a hundredth of a millimetre)."""
     return 0.5 * (1.0 + np.tanh(0.7978845608 * (z + 0.044715 * z * z * z)))
 
 
 def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
-    """Progress 0..1 with a lognormal speed: an early peak and a long tail; mirrored, a late peak.
+    """Progress 0..1 with a lognormal speed, which peaks early and has a long tail; with `mirrored` it peaks late.
 
-    `sigma` 0.2 is almost symmetric, 0.7 very skewed. The 99.5 % point lies at tau = 1; the ends are exact.
+    With `sigma` 0.2 the speed is almost symmetric, with 0.7 very skewed. The distribution is cut at its 99.5 % point.
     """
     u = np.clip(tau, 0.0, 1.0)
     if mirrored:
@@ -49,17 +49,17 @@ def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
 
 
 def stroke_progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> Array:
-    """Progress 0..1 of one stroke with a random human speed profile.
+    """Progress 0..1 of one stroke at relative times `tau`, with a random human speed profile.
 
-    `moving_ends` (0..1) is how much of the speed is left at landing and leaving: the finger touches only the
-    middle part of a longer movement.
+    `moving_ends` (0..1) is how fast the finger still is when it lands and leaves: it touches only the middle part of a
+    longer movement.
     """
     first = 0.32 * moving_ends * rng.uniform(0.2, 1.0)
     last = 1.0 - 0.32 * moving_ends * rng.uniform(0.2, 1.0)
     style, sigma = rng.random(), rng.uniform(0.25, 0.65)
     v = np.clip(tau, 0.0, 1.0)
     if rng.random() < 0.15:
-        # Cloth drags: the finger sticks and slips. Still monotone, because the amplitude stays below 1.
+        # The finger sticks to the cloth and slips. Progress stays monotone, since the amplitude is below 1.
         waves, depth = rng.uniform(2.0, 6.0) * 2.0 * math.pi, rng.uniform(0.2, 0.85)
         v = v - depth * np.sin(waves * v) * (1.0 - v) / waves
     u = first + (last - first) * v
@@ -75,7 +75,7 @@ def stroke_progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0
 
 
 def wander(t: Array, rng: np.random.Generator, low_hz: float, high_hz: float, waves: int = 4) -> Array:
-    """Smooth random motion (n,) of unit standard deviation: a few sines between two frequencies."""
+    """Smooth random motion (n,) with a standard deviation of 1: a sum of sines between two frequencies."""
     f = rng.uniform(low_hz, high_hz, waves)
     phase = rng.uniform(0.0, 2.0 * math.pi, waves)
     amplitude = rng.uniform(0.3, 1.0, waves)
@@ -97,19 +97,19 @@ def arc(s: Array, length: float, heading: float, bend: float) -> tuple[Array, Ar
 
 
 def ellipse(phase: Array, radius: Array, flatness: float, tilt: float) -> tuple[Array, Array]:
-    """x, y (n,) around the origin: half axes radius * flatness and radius / flatness, turned by tilt."""
+    """x, y (n,) around the origin, with the half axes radius * flatness**0.5 and radius / flatness**0.5, turned."""
     u, v = radius * math.sqrt(flatness) * np.cos(phase), radius / math.sqrt(flatness) * np.sin(phase)
     return turned(u, v, tilt)
 
 
 def turned(x: N, y: N, angle: float) -> tuple[N, N]:
-    """Points turned about the origin."""
+    """Points turned about the origin by `angle` radians."""
     c, s = math.cos(angle), math.sin(angle)
     return x * c - y * s, x * s + y * c
 
 
 def turning(tau: Array, rng: np.random.Generator) -> Array:
-    """Progress 0..1 around a closed curve: even in the middle, easing in and out by a random amount."""
+    """Progress 0..1 around a closed curve: nearly even, with a random amount of easing in and out."""
     ease = rng.uniform(0.0, 0.25)
     even, smooth = np.clip(tau, 0.0, 1.0), minimum_jerk(tau)
     share = rng.uniform(0.1, 0.7)
@@ -120,9 +120,9 @@ def turning(tau: Array, rng: np.random.Generator) -> Array:
 def submovements(
     t: Array, points: Sequence[tuple[float, float]], starts: Sequence[float], durations: Sequence[float]
 ) -> tuple[Array, Array]:
-    """x, y (n,) through via points: the minimum-jerk moves from point to point add up.
+    """x, y (n,) through via points: the sum of minimum-jerk movements from point to point.
 
-    Moves that overlap in time round the corner between them, as hands do.
+    Movements that overlap in time round the corner between them, as hands do.
     """
     x = np.full_like(t, points[0][0])
     y = np.full_like(t, points[0][1])
@@ -138,7 +138,8 @@ def polyline(
 ) -> tuple[Array, Array, Array]:
     """t, x, y (n,) of a stroke through via points.
 
-    `leg_s` gives each leg's duration; neighbours overlap by a share of the shorter one, or wait `pause_s`.
+    `leg_s` has each leg's duration. The next leg begins after `pause_s`, or, if this is 0, earlier than the end of the
+    last one: by the share `overlap` of the shorter of both.
     """
     starts = [0.0]
     for before, after in zip(leg_s[:-1], leg_s[1:], strict=True):

@@ -1,4 +1,4 @@
-"""A simulated sensor frame by frame: what touches it is told as it happens."""
+"""A simulated sensor frame by frame, whose contacts are given while they happen."""
 
 import math
 from collections.abc import Sequence
@@ -17,20 +17,20 @@ NO_ACT = Performance("", "", (), 0.0, "normal", 1, 0)
 
 
 class LiveTextile:
-    """The textile and the electronics of a sensor; what lags in them is remembered from frame to frame.
+    """The textile and the electronics of a sensor, with their state from frame to frame.
 
-    Its taxels do not drift, since a drift is drawn for a whole recording at once.
+    There is no drift, since drift is drawn for a whole recording at once.
     """
 
     def __init__(self, sensor: SimulatedSensor, seed: int) -> None:
-        """`seed` is that of the noise."""
-        self.sensor = replace(sensor, drift=0.0, touch_noise=math.nan)  # who tells the contacts knows where they are
+        """`seed` is the seed of the noise."""
+        self.sensor = replace(sensor, drift=0.0, touch_noise=math.nan)  # no finger reports: the caller has the contacts
         self._rng = generator(seed, 0x11FE)
         dt = 1.0 / sensor.rate_hz
         self._lag = Lag((sensor.rows, sensor.columns), dt, sensor.relaxation, sensor.taus_s, sensor.hysteresis)
 
     def frame(self, t: float, presses: Sequence[Press]) -> NDArray[np.generic]:
-        """(R, C) counts of the frame that ends at `t` seconds, on the clock of the presses. Call it in order."""
+        """The (R, C) counts of the frame that ends at `t` s on the presses' clock; `t` must rise from call to call."""
         times, sensor = np.array([t]), self.sensor
         field, _ = sample(sensor, [(0.0, replace(NO_ACT, contacts=tuple(presses)))], times, self._rng)
         field = leak(field, sensor.row_crosstalk, sensor.column_crosstalk, sensor.ghost)

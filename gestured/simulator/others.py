@@ -1,4 +1,4 @@
-"""Presses, taps and strokes of one finger that are none of the ten, and the list of all non-gestures."""
+"""Presses, taps and strokes of one finger that are none of the ten gestures, and the table of all non-gestures."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ def long_press(occasion: Occasion) -> list[Press]:
 
 
 def slow_touch(occasion: Occasion) -> list[Press]:
-    """A light touch that comes and goes slowly and drifts a little: somebody leans or feels."""
+    """A light touch that comes and goes slowly and drifts a little, as of somebody who leans or feels."""
     rng = occasion.rng
     x, y = occasion.spot(3.0, 3.0)
     t = grid(rng.uniform(0.9, 2.6))
@@ -47,7 +47,7 @@ def diagonal_swipe(occasion: Occasion) -> list[Press]:
 
 
 def tap_then_swipe(occasion: Occasion) -> list[Press]:
-    """A tap, and then a swipe from about there."""
+    """A tap, and then a swipe that begins near it."""
     rng = occasion.rng
     heading = float(rng.choice([RIGHT, UP, LEFT, DOWN]))
     path = stroke(occasion, heading, swipe_length(occasion, heading))
@@ -71,7 +71,7 @@ def press_and_slide(occasion: Occasion) -> list[Press]:
 
 
 def triple_tap(occasion: Occasion) -> list[Press]:
-    """Three or four taps in a row at about one place."""
+    """Three or four taps in a row at about the same place."""
     rng = occasion.rng
     x, y = occasion.spot(4.0, 4.0)
     made, start = [], 0.0
@@ -84,7 +84,7 @@ def triple_tap(occasion: Occasion) -> list[Press]:
 
 
 def taps_apart(occasion: Occasion) -> list[Press]:
-    """Two taps as close in time as a double tap, but at places a third of the pad or more apart."""
+    """Two taps as close in time as a double tap, but a third of the pad or more apart."""
     rng = occasion.rng
     apart = occasion.small * rng.uniform(0.38, 0.7)
     angle = rng.uniform(-math.pi, math.pi)

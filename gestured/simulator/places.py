@@ -1,7 +1,7 @@
-"""Where a sensor may be, and what rests and happens there: everyday life as one table.
+"""The places where a sensor may be, and what rests and happens there: everyday life as one table.
 
-`PLACES` and `FINGERS` here and `POSTURES` in `resting`: each number has its source, or is assumed. Whoever changes one
-prints the figures with both.
+Each number in `PLACES` and `FINGERS`, and in `POSTURES` of `resting`, has its source or is assumed. If you change one,
+print the figures with the old and the new number.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from gestured.simulator.people import Press
 from gestured.simulator.resting import HAND, NOBODY, POSTURES, THING, rest
 from gestured.simulator.unmeant import SHORT, Places
 
-# What the fingers of a hand that rests do, an hour of such rest; assumed.
+# What the fingers of a resting hand do: times an hour of rest; assumed.
 FINGERS: Mapping[str, float] = {
     "playing_tap": 240.0,
     "playing_drum": 60.0,
@@ -23,27 +23,27 @@ FINGERS: Mapping[str, float] = {
     "playing_stretch": 40.0,
 }
 HAPPENINGS: Mapping[str, Maker] = {"idle_tap": one_tap, **SHORT}
-# What makes something that rests of an occasion, its seconds and the road: its presses, and where its fingers lie.
+# Makes something that rests, from an occasion, the seconds and the road: its presses, and where its fingers lie (mm).
 Resting = Callable[[Occasion, float, float], tuple[list[Press], Places]]
-RESTS: Mapping[str, tuple[Resting, float]] = {  # with the median dwell time in s
+RESTS: Mapping[str, tuple[Resting, float]] = {  # by posture: its maker, and its median dwell time in s
     name: (partial(rest, name), posture.dwell_s) for name, posture in POSTURES.items()
 }
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a sensor is: its postures by share, what happens beside them an hour, and how the road shakes it."""
+    """A place of a sensor: the postures there, what happens beside them, and how the road shakes them."""
 
     name: str
-    postures: Mapping[str, float]
-    rates: Mapping[str, float]  # happenings an hour; all assumed
-    road: float  # of the force, one standard deviation
-    meant: float  # gestures an hour
+    postures: Mapping[str, float]  # how often each is taken, in relation to the others
+    rates: Mapping[str, float]  # by kind: happenings an hour; all assumed
+    road: float  # share of the force by which the road shakes it, one standard deviation
+    meant: float  # meant gestures an hour
     rests: Mapping[str, tuple[Resting, float]] = field(default_factory=lambda: RESTS)
     happenings: Mapping[str, Maker] = field(default_factory=lambda: HAPPENINGS)
 
 
-# What may happen anywhere, an hour; all assumed.
+# What may happen anywhere: times an hour; all assumed.
 ANYWHERE: Mapping[str, float] = {
     "sleeve_brush": 15.0,
     "bump": 20.0,
@@ -61,7 +61,7 @@ ANYWHERE: Mapping[str, float] = {
     "wrinkle": 3.0,
     "long_press": 2.0,
     "press_and_slide": 1.0,
-    "idle_tap": 8.0,  # of a free hand, while nobody lies there; one that lies plays by FINGERS
+    "idle_tap": 8.0,  # only while nothing rests there; the fingers of a resting hand tap as FINGERS says
 }
 PLACES: Mapping[str, Place] = {
     "armrest": Place(

@@ -12,10 +12,10 @@ from gestured.simulator.people import Artefact, generator
 
 
 def amplify(sensor: Nature, field: Array, times: Array, inclination: int, rng: np.random.Generator) -> Array:
-    """Signal (N, R, C) in touches: this sensor's own gains and offsets, drift and noise put on the field."""
+    """The signal (N, R, C) in normal touches: the field with this sensor's gains, offsets, drift and noise."""
     own = generator(sensor.seed, 0x5E5)
     rows, columns, n = sensor.rows, sensor.columns, times.size
-    # Lines differ (length, contacts) and so do taxels.
+    # Lines differ in length and contacts, and taxels differ, too.
     lines = 0.5 * own.standard_normal((rows, 1)) + 0.5 * own.standard_normal((1, columns))
     gain = np.exp(sensor.gain_spread * (0.7 * own.standard_normal((rows, columns)) + lines))
     offset = sensor.offset + sensor.offset_spread * own.standard_normal((rows, columns))
@@ -35,7 +35,7 @@ def amplify(sensor: Nature, field: Array, times: Array, inclination: int, rng: n
     out += sensor.column_noise * rng.standard_normal((n, 1, columns))
     out += sensor.common_noise * rng.standard_normal((n, 1, 1))
     if sensor.slow_noise > 0.0:
-        # A moving average over eight frames: noise that a mean over frames does not take away.
+        # A moving average over eight frames: noise that a mean over a few frames does not reduce.
         walk = np.cumsum(rng.standard_normal((n + 8, rows, columns)), axis=0)
         out += sensor.slow_noise / math.sqrt(8.0) * (walk[8:] - walk[:-8])
     if sensor.hum > 0.0:
@@ -52,7 +52,7 @@ def disturb(
     artefacts: Sequence[tuple[float, Artefact]],
     rng: np.random.Generator,
 ) -> None:
-    """Adds interference to the signal in place: what was performed, and this sensor's own bursts."""
+    """Add interference to the signal in place: the artefacts with their starts (s), and the sensor's own bursts."""
     todo, dt, end = list(artefacts), 1.0 / sensor.rate_hz, float(times[-1])
     for start in rng.uniform(0.0, end, int(rng.poisson(sensor.bursts_per_minute * end / 60.0))):
         form = str(rng.choice(["all", "row", "column", "taxel", "taxels"]))
@@ -72,7 +72,7 @@ def disturb(
 
 
 def _mask(form: str, signal: Array, rng: np.random.Generator) -> Array:
-    """Which taxels (R, C) an artefact hits, 0..1."""
+    """How much an artefact of that form hits each taxel: (R, C), 0..1."""
     _, rows, columns = signal.shape
     mask = np.zeros((rows, columns))
     r, c = int(rng.integers(rows)), int(rng.integers(columns))
@@ -92,7 +92,7 @@ def _mask(form: str, signal: Array, rng: np.random.Generator) -> Array:
 
 
 def digitise(sensor: Nature, signal: Array) -> NDArray[np.generic]:
-    """Integer frames (N, R, C): scaled, bad taxels put in, rounded, clipped."""
+    """Integer frames (N, R, C): the signal scaled, with bad taxels, rounded and clipped."""
     own = generator(sensor.seed, 0xBAD)
     cells = own.permutation(sensor.rows * sensor.columns)
     out = np.rint(signal * sensor.gain)
@@ -110,7 +110,7 @@ def digitise(sensor: Nature, signal: Array) -> NDArray[np.generic]:
 
 
 def transmit(sensor: Nature, times: Array, rng: np.random.Generator) -> tuple[NDArray[np.int64], Array]:
-    """Which frames arrive (a repeat is a duplicate) and when: in order, strictly one after the other."""
+    """The indices of the frames that arrive (a repeated one is a duplicate), and their strictly increasing times."""
     n = times.size
     keep = rng.random(n) >= sensor.loss
     for k in np.flatnonzero(rng.random(n) < sensor.loss / 4.0):

@@ -1,7 +1,7 @@
-"""What rests on a sensor for a while: arms, elbows, hands with their fingers, bodies, things.
+"""Postures that rest on a sensor for a while: arms, elbows, hands with their fingers, bodies, things.
 
-Whatever rests lands, breathes, is put down anew every few seconds, lifts for a moment, is shaken by the road, and
-leaves. A hand and an arm meet a sensor in several patches, of which each has its share of all that.
+Whatever rests lands, breathes, shifts every few seconds, lifts for a moment, is shaken by the road, and leaves. A hand
+or an arm touches a sensor in several patches, which do all this together, each with a force of its own.
 """
 
 import math
@@ -14,28 +14,28 @@ from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Press
 from gestured.simulator.unmeant import Places, even
 
-STEP_S = 0.04  # time grid of what rests: nothing in it is faster than the road
+STEP_S = 0.04  # time grid of what rests, in which nothing is faster than the road
 BREATH_HZ = 0.25  # an adult at rest
 ROAD_HZ = (1.0, 12.0)  # a body on a seat passes on no more of a road's spectrum (ISO 8608 falls with the square)
-RESEAT_S = 9.0  # between two shifts of what rests; assumed
-LIFT_S = 40.0  # between two moments in which it is nearly or wholly lifted; assumed
-BESIDE = 0.05  # of the pad's side: so far beyond its border the middle of what rests may lie; assumed
+RESEAT_S = 9.0  # mean time between two shifts of what rests; assumed
+LIFT_S = 40.0  # mean time between two moments in which what rests is lifted, partly or wholly; assumed
+BESIDE = 0.05  # of the pad's side: the middle of what rests may lie so far beyond the border; assumed
 
 
 @dataclass(frozen=True)
 class Posture:
-    """Something that rests: for how long, and what it presses with."""
+    """Something that rests: how long, how heavily, and how large it is."""
 
-    dwell_s: float  # median; lognormal
-    force: tuple[float, float]  # in normal touches
+    dwell_s: float  # the median of a lognormal distribution
+    force: tuple[float, float]  # range, in normal touches
     size: tuple[float, float]  # of the pad's shorter side: length and width, one standard deviation
-    patches: int = 1  # at most; in a row along its length
-    still: bool = False  # it neither breathes nor moves
+    patches: int = 1  # the most patches, which lie in a row along its length
+    still: bool = False  # whether it neither breathes nor moves
 
 
 NOBODY, HAND, THING = "nobody", "hand", "thing"
-# Dwell times are assumed, but for the armrest's and the door's: forearm laid on, elbow while steering, and pushing off
-# are the three postures that were measured on door armrests (SAE 2007-01-1217).
+# Dwell times are assumed, except those of "forearm" (laid on), "elbow" (while steering) and "push_off": these are the
+# three postures that were measured on door armrests (SAE 2007-01-1217).
 POSTURES = {
     NOBODY: Posture(25.0, (0.0, 0.0), (0.0, 0.0)),
     "forearm": Posture(40.0, (0.5, 7.0), (0.5, 0.16), patches=3),
@@ -48,7 +48,7 @@ POSTURES = {
 
 
 def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[list[Press], Places]:
-    """What rests so long, shaken by so much of its force; and, of a hand, where its fingers lie (mm)."""
+    """The presses of a posture for `seconds`, shaken by the share `road`; and its fingers' places (mm) if a hand."""
     posture, rng, small = POSTURES[name], occasion.rng, occasion.small
     t = np.linspace(0.0, seconds, max(8, math.ceil(seconds / STEP_S) + 1))
     course = _course(t, rng, posture, road)
@@ -68,7 +68,7 @@ def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[li
         made.append(Press(t, a, b, force, length / count**0.5, width, angle, 0.1, flatness, False))
     if name != HAND:
         return made, ()
-    # Fingers in a row before the palm; some bear on the pad, and some lie so lightly that they leave nothing.
+    # The fingers lie in a row before the palm. Some press on the pad; others lie so lightly that they leave nothing.
     fingers, reach, gap = int(rng.integers(1, 5)), float(rng.uniform(35.0, 90.0)), occasion.spacing()
     places = []
     for k in range(fingers):
@@ -84,7 +84,7 @@ def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[li
 
 
 def _course(t: Array, rng: np.random.Generator, posture: Posture, road: float) -> Array:
-    """Force of what rests over time (n,), about 1: it lands, breathes, lifts, is shaken, and leaves."""
+    """The force (n,), about 1, of something that lands, breathes, lifts, is shaken by the road, and leaves."""
     seconds = float(t[-1])
     land, leave = (float(rng.uniform(0.05, 0.5)) for _ in range(2))
     course = np.clip(t / min(land, 0.4 * seconds), 0.0, 1.0) * np.clip(
@@ -100,7 +100,7 @@ def _course(t: Array, rng: np.random.Generator, posture: Posture, road: float) -
 
 
 def _reseated(t: Array, rng: np.random.Generator) -> Array:
-    """A value (n,), -1..1, that is put anew every few seconds, within a third of a second each time."""
+    """A random course (n,) within -1..1 with a step every RESEAT_S on average, each within a third of a second."""
     moments = np.sort(rng.uniform(0.0, t[-1], int(rng.poisson(t[-1] / RESEAT_S))))
     way = np.zeros_like(t)
     for moment, step in zip(moments, rng.normal(0.0, 1.0, moments.size), strict=True):

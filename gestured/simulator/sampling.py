@@ -1,4 +1,4 @@
-"""From contacts in continuous time to a pressure field at the sensor's instants, and to finger reports."""
+"""The sampling of contacts in continuous time: the pressure field at the sensor's instants, and finger reports."""
 
 import math
 
@@ -10,8 +10,8 @@ from gestured.simulator.nature import Nature
 from gestured.simulator.people import Performance, Press
 from gestured.simulator.textile import tail_kernel
 
-FINGER_MM = 3.7  # the finger that a sensor's `gain` refers to
-INSTANTS = 3  # per row and frame
+FINGER_MM = 3.7  # the size (one standard deviation) of the finger that a sensor's `gain` refers to
+INSTANTS = 3  # instants per row and frame at which contacts are sampled
 TRACKED_FORCE = 0.15  # lighter fingers are not reported
 
 
@@ -24,7 +24,7 @@ class Fingers:
         self._number = 0
 
     def track(self, contact: Press, at: Array, first: int, sensor: Nature, rng: np.random.Generator) -> None:
-        """Reports one finger at times `at` (its own clock) in the frames from `first` on."""
+        """Report one finger at times `at` (s on its own clock), which are those of the frames from `first` on."""
         force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
         error = rng.normal(0.0, sensor.touch_noise, (2, at.size))
         x = np.clip(np.interp(at, contact.t, contact.x) / sensor.pitch_mm - 0.5 + error[0], 0.0, sensor.columns - 1)
@@ -40,9 +40,9 @@ class Fingers:
 def sample(
     sensor: Nature, performances: list[tuple[float, Performance]], times: Array, rng: np.random.Generator
 ) -> tuple[Array, Fingers]:
-    """Pressure (N, R, C) in normal touches, of frames that end at `times` (N,), and the finger reports.
+    """The pressure (N, R, C) in normal touches of frames that end at `times` (N,), and the finger reports.
 
-    The rows are read one after the other within a frame, each averaging over a few instants.
+    Within a frame the rows are read one after the other; each is a mean over a few instants.
     """
     n, rows, columns, pitch = times.size, sensor.rows, sensor.columns, sensor.pitch_mm
     field = np.zeros((n, rows, columns))
@@ -69,7 +69,7 @@ def sample(
 
 
 def footprint(sensor: Nature, contact: Press, at: Array, taxel_x: Array, taxel_y: Array) -> Array:
-    """Mean pressure (F, R, C) of one contact over the instants `at` (F, S, R): a turned super-Gaussian."""
+    """The mean pressure (F, R, C) of one contact over the instants `at` (F, S, R): a turned super-Gaussian."""
     force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
     x, y = np.interp(at, contact.t, contact.x), np.interp(at, contact.t, contact.y)
     swell = np.maximum(force, 1e-3) ** contact.growth
@@ -77,13 +77,13 @@ def footprint(sensor: Nature, contact: Press, at: Array, taxel_x: Array, taxel_y
     blur = (sensor.spread * sensor.pitch_mm) ** 2 + sensor.pitch_mm**2 / 12.0
     a2, b2 = (contact.length * swell) ** 2 + blur, (contact.width * swell) ** 2 + blur
     reference = FINGER_MM**2 + blur
-    # A finger spreads its force over its area; a large thing presses nearly as hard per area as it is heavy.
+    # A finger spreads its force over its area; the pressure of anything else falls less with its area.
     weaker = np.sqrt(a2 * b2) if contact.finger else reference + 0.25 * np.sqrt(a2 * b2)
     height = force**sensor.force_exponent * reference / weaker
     dx, dy = taxel_x - x[..., None], (taxel_y - y)[..., None]
     c, s = math.cos(contact.angle), math.sin(contact.angle)
     q = (dx * c + dy * s) ** 2 / a2[..., None] + (dy * c - dx * s) ** 2 / b2[..., None]
-    # Only what is larger than the blur can keep a flat top.
+    # Only a contact that is larger than the blur keeps a flat top.
     own = contact.length * contact.width
     flat = 1.0 + (contact.flatness - 1.0) * own / (own + blur)
     if abs(flat - 1.0) > 0.02:

@@ -1,9 +1,9 @@
-"""The sensor: from contacts in continuous time to integer frames as they arrive.
+"""The simulated sensor: from contacts in continuous time to integer frames as they arrive.
 
-Order of things: contacts are sampled while the rows are scanned (three instants a row), spread by the
-textile, leak along lines, relax and hang behind, are compressed, get each taxel's own gain and offset, drift,
-noise, interference, bad taxels, and are rounded. The radio then delays, loses and doubles frames. All
-strengths are relative to `gain`, the counts of a normal touch.
+The pressure of contacts is sampled while the rows are scanned (three instants a row), and spread by the textile. The
+field leaks along lines, lags, and is compressed. It gets each taxel's gain and offset, drift, noise, interference and
+bad taxels, and is rounded. The radio then delays, loses and doubles frames. All strengths are relative to `gain`, the
+counts of a normal touch.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from gestured.simulator.textile import compress, leak, relax
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """What really happened in a take; times in seconds on the take's clock, first and last contact."""
+    """One performance in a take as it really was, from its first to its last contact in s on the take's clock."""
 
     label: str
     kind: str
@@ -34,36 +34,36 @@ class Act:
 
     @classmethod
     def of(cls, one: Performance, start: float) -> "Act":
-        """A performance that began at `start` s."""
+        """The act of a performance that began at `start` s."""
         return cls(one.label, one.kind, start, start + one.duration_s, one.speed, one.inclination, one.participant)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """What a sensor sent, and the truth. N frames arrived, duplicates included."""
+    """What a sensor sent, and what was really performed. N frames arrived, duplicates included."""
 
     frames: NDArray[np.generic]  # (N, R, C) integer raw counts, row 0 on top
     times: Array  # (N,) arrival in seconds, strictly increasing
-    sensor_times: Array  # (N,) when each frame was sampled
+    sensor_times: Array  # (N,) s, when each frame was sampled
     counter: NDArray[np.int64]  # (N,) the sensor's frame counter: a gap is a lost frame, a repeat a duplicate
-    touches: NDArray[np.float32]  # (N, 3, 2) x right, y upward from the bottom-left taxel, in pitches; NaN
-    touch_ids: NDArray[np.int32]  # (N, 3), -1 for none
+    touches: NDArray[np.float32]  # (N, 3, 2) x right, y upward from the bottom-left taxel, in pitches; NaN for none
+    touch_ids: NDArray[np.int32]  # (N, 3); -1 for none
     events: tuple[Act, ...]
     sensor: "SimulatedSensor"
 
     @property
     def label(self) -> str:
-        """The label of the one event, or "session" where there are none or several."""
+        """The label of the only event, or "session" if there are none or several."""
         return self.events[0].label if len(self.events) == 1 else "session"
 
 
 @dataclass(frozen=True)
 class SimulatedSensor(Nature):
-    """One sensor: its nature, and what it sends."""
+    """A sensor of some nature, which records performances."""
 
     @staticmethod
     def nominal(day: int | None = None) -> "SimulatedSensor":
-        """The 9 x 9 textile at 15 Hz; with a day, the same sensor as it is on another day."""
+        """The textile of 9 x 9 taxels at 15 Hz; with `day`, the same sensor as it is on that day."""
         sensor = SimulatedSensor(seed=1)
         if day is None:
             return sensor
@@ -85,10 +85,10 @@ class SimulatedSensor(Nature):
     def record(
         self, performances: Sequence[tuple[float, Performance]], duration_s: float, rng: np.random.Generator
     ) -> Take:
-        """What this sensor sends in `duration_s` seconds while these performances start at these times.
+        """What this sensor sends in `duration_s` seconds during performances, each with its start in s.
 
-        A start may be negative: then the pad is touched from the first frame on. No performances at all give
-        an idle recording.
+        A start may be negative, so that the pad is touched from the first frame on. Without performances the recording
+        is idle.
         """
         todo = list(performances)
         dt = 1.0 / self.rate_hz

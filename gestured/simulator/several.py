@@ -1,4 +1,4 @@
-"""What several fingers do that is none of the ten gestures."""
+"""Taps and movements of several fingers that are none of the ten gestures."""
 
 import math
 
@@ -37,7 +37,7 @@ def knuckles(occasion: Occasion) -> list[Press]:
 
 
 def drumming(occasion: Occasion) -> list[Press]:
-    """Several fingers tap one after the other at places apart, four to ten taps."""
+    """Several fingers tap one after the other, each at its place: four to ten taps."""
     rng = occasion.rng
     fingers = int(rng.integers(2, 5))
     gap = min(occasion.spacing(), 0.8 * occasion.small / (fingers - 1))
@@ -54,7 +54,7 @@ def drumming(occasion: Occasion) -> list[Press]:
 
 
 def two_finger_tap(occasion: Occasion) -> list[Press]:
-    """Two or three fingers at once for 50 to 400 ms, sometimes longer, once or twice."""
+    """Two or three fingers at once: once or twice for 40 to 590 ms, or once for 0.5 to 1.6 s."""
     rng = occasion.rng
     count = int(rng.choice([2, 3], p=[0.75, 0.25]))
     gap = min(occasion.spacing(), 0.8 * occasion.small / (count - 1))
@@ -64,7 +64,7 @@ def two_finger_tap(occasion: Occasion) -> list[Press]:
     start, held = 0.0, rng.random() < 0.2
     for _ in range(1 if held else int(rng.choice([1, 2], p=[0.7, 0.3]))):
         duration = rng.uniform(0.5, 1.6) if held else occasion.tap_s() * rng.uniform(1.0, 1.3)
-        late_s = min(0.05, 0.3 * duration)  # of one finger after the other
+        late_s = min(0.05, 0.3 * duration)  # by which one finger may land after another
         made += [
             touch_down(occasion, x, y, duration, start + rng.uniform(0.0, late_s), rng.uniform(0.5, 1.1))
             for x, y in places
@@ -74,7 +74,7 @@ def two_finger_tap(occasion: Occasion) -> list[Press]:
 
 
 def _two(occasion: Occasion, distance: tuple[float, float], turn: float) -> list[Press]:
-    """Two fingers about their middle: from one distance (mm) to another while the line between them turns."""
+    """Two fingers move from one distance (mm) to another, while the line between them turns by `turn` radians."""
     rng = occasion.rng
     before, after = occasion.rests()
     move = float(np.clip(0.5 / occasion.rate * rng.lognormal(0.0, 0.2), 0.18, 1.6))
@@ -82,7 +82,7 @@ def _two(occasion: Occasion, distance: tuple[float, float], turn: float) -> list
     s = stroke_progress((t - before) / move, rng)
     angle = rng.uniform(0.0, math.pi) + turn * s
     half = 0.5 * (distance[0] + (distance[1] - distance[0]) * s)
-    lean = rng.uniform(0.2, 0.8)  # one finger may do most of the way
+    lean = rng.uniform(0.2, 0.8)  # one finger may move further than the other
     dx, dy = half * np.cos(angle), half * np.sin(angle)
     shift = rng.normal(0.0, 0.04, 2) * occasion.small
     xs = np.concatenate([2 * lean * dx, -2 * (1 - lean) * dx]) + shift[0] * np.concatenate([s, s])
@@ -103,7 +103,7 @@ def _two(occasion: Occasion, distance: tuple[float, float], turn: float) -> list
 
 
 def pinch(occasion: Occasion) -> list[Press]:
-    """Two fingers move together."""
+    """Two fingers move towards each other."""
     far = occasion.small * occasion.rng.uniform(0.45, 0.85)
     return _two(occasion, (far, far * occasion.rng.uniform(0.15, 0.45)), occasion.rng.normal(0.0, 0.25))
 

@@ -1,4 +1,4 @@
-"""Building blocks of performances: a finger that stays, a stroke, and several fingers on one."""
+"""Building blocks of performances: a finger that stays, a stroke, and several fingers on one stroke."""
 
 import math
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from gestured.simulator.people import Press
 def touch_down(
     occasion: Occasion, x: float, y: float, duration_s: float, start: float = 0.0, force: float = 1.0
 ) -> Press:
-    """A finger that stays where it lands for that long, rolling a little."""
+    """A finger that stays where it lands for `duration_s`, and rolls a little."""
     rng = occasion.rng
     t = grid(duration_s)
-    # A fingertip rolls on and off and its centre moves with the load: some millimetres on a real panel.
+    # A fingertip rolls on and off, and its centre moves with the load: some millimetres on a real panel.
     u = t / duration_s
     roll = np.multiply.outer(u - 0.5, np.clip(rng.normal(0.0, 1.9, 2), -4.5, 4.5))
     roll += np.multiply.outer(np.sin(math.pi * u), rng.normal(0.0, 0.8, 2))
@@ -34,7 +34,7 @@ def touch_down(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stroke:
-    """A path relative to its centre on a time grid, and how the finger lands on it and leaves it."""
+    """A path relative to its centre (mm, s), and how long the finger takes to land on it and to leave it."""
 
     t: Array
     x: Array
@@ -44,10 +44,10 @@ class Stroke:
 
 
 def stroke(occasion: Occasion, heading: float, length: float, *, limit: float = 0.36) -> Stroke:
-    """One stroke of `length` millimetres towards `heading` (radians), within `limit` radians of it.
+    """One stroke of `length` millimetres towards `heading` (radians), at most `limit` radians off.
 
-    Bent about wrist or elbow, unsteady, sometimes with a hook at the end, with rests or gliding on and off.
-    Duration grows with length^0.4, as it does in free reaching.
+    It is bent about wrist or elbow and unsteady, and sometimes has a hook at the end, rests, or moving ends. Its
+    duration grows with length^0.4, as in free reaching.
     """
     rng, person = occasion.rng, occasion.person
     error = float(np.clip(occasion.turn + rng.normal(0.0, person.aim), -limit, limit))
@@ -68,7 +68,7 @@ def stroke(occasion: Occasion, heading: float, length: float, *, limit: float = 
     sway = person.wobble_mm * wander(t, rng, 0.4, 3.0, 3) * min(1.0, length / 30.0)
     x, y = x - sway * math.sin(heading), y + sway * math.cos(heading)
     half = 0.5 * length
-    # A flick that also faded in and out would leave nothing between two frames.
+    # With full fades, a flick would leave nothing between two frames.
     soft = min(1.0, move / 0.3)
     fade_in = soft * rng.uniform(0.05, 0.35) * move if glides else rng.uniform(0.02, 0.08)
     fade_out = soft * rng.uniform(0.05, 0.4) * move if glides else rng.uniform(0.02, 0.1)
@@ -76,7 +76,7 @@ def stroke(occasion: Occasion, heading: float, length: float, *, limit: float = 
 
 
 def swipe_length(occasion: Occasion, heading: float) -> float:
-    """Length of a swipe in millimetres: 0.2 to 0.95 of the pad's extent in that direction, 12 to 150 mm."""
+    """The length of a swipe in mm: 0.2 to 0.97 of the pad's extent in that direction, and 12 to 150."""
     across = abs(math.cos(heading)) * occasion.width + abs(math.sin(heading)) * occasion.height
     across = min(across, 1.25 * occasion.small / max(abs(math.cos(heading)), abs(math.sin(heading)), 0.7) + 60.0)
     length = across * (0.21 + 0.72 * occasion.reach()) * occasion.grow
@@ -84,7 +84,7 @@ def swipe_length(occasion: Occasion, heading: float) -> float:
 
 
 def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float) -> list[Press]:
-    """Several fingers side by side on one stroke: uneven in force, size, length, landing and lifting."""
+    """One finger on a stroke, or several side by side, uneven in force, size, length, landing and lifting."""
     rng = occasion.rng
     if count == 1:
         x, y = occasion.settle(path.x, path.y)

@@ -1,8 +1,8 @@
-"""How a soft pressure matrix answers: viscoelastic lag, hysteresis, leakage between lines, compression.
+"""The response of a soft pressure matrix: viscoelastic lag, hysteresis, leakage between lines, compression.
 
-Sources: the standard linear solid and its Prony series for relaxation; the play operator as the simplest
-Preisach element for hysteresis; sneak paths in passive matrices for crosstalk and ghosts. Every lag steps by
-`-expm1(-dt / tau)`, which is exact for an input held over dt and stable for any dt / tau.
+Sources: the standard linear solid and its Prony series for relaxation; the play operator as the simplest Preisach
+element for hysteresis; sneak paths in passive matrices for crosstalk and ghosts. Every lag steps by
+`-expm1(-dt / tau)`, which is exact for an input held over dt, and stable for any dt / tau.
 """
 
 import math
@@ -12,15 +12,14 @@ import numpy as np
 
 from gestured.simulator.kinematics import Array
 
-REMANENCE_S = 1.5  # after a touch, what hysteresis has left behind fades that fast
+REMANENCE_S = 1.5  # time constant with which the rest of a touch (hysteresis) fades
 
 
 def relax(field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequence[float], hysteresis: float) -> Array:
-    """The lagging answer (N, R, C) to a pressure field (N, R, C) with frames dt_s apart.
+    """The lagging response (N, R, C) to a pressure field (N, R, C) with frames `dt_s` apart.
 
-    Each branch follows the input with its own tau and makes up its amplitude of the answer; a negative
-    amplitude is an overshoot that relaxes. `hysteresis` is the width of the play operator in units of a
-    touch.
+    Each branch follows the input with its own tau, and its amplitude is its share of the response; a negative one is an
+    overshoot that relaxes. `hysteresis` is the width of the play operator in normal touches.
     """
     if not len(amplitudes) and hysteresis <= 0.0:
         return field
@@ -29,7 +28,7 @@ def relax(field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequen
 
 
 class Lag:
-    """The lagging answer of `relax` frame by frame, for a grid of the given shape."""
+    """The lagging response of `relax`, frame by frame, for a grid of the given shape."""
 
     def __init__(
         self,
@@ -49,9 +48,9 @@ class Lag:
         self._resting = True
 
     def answer(self, p: Array) -> Array:
-        """The answer (R, C) to the pressure (R, C) of the next frame.
+        """The response (R, C) to the pressure (R, C) of the next frame.
 
-        A frame in which nothing is pressed and everything has decayed answers with exactly nothing.
+        It is exactly 0 if nothing is pressed and earlier touches have decayed.
         """
         pressed = float(p.max()) > 0.0
         if self._resting and not pressed:
@@ -68,7 +67,7 @@ class Lag:
 
 
 def leak(field: Array, row: float, column: float, ghost: float) -> Array:
-    """Crosstalk (N, R, C): a share of each row's and column's sum, and ghosts where touched lines cross."""
+    """The field (N, R, C) with crosstalk: shares of each row's and column's sum, and ghosts at crossings of lines."""
     rows, columns = field.sum(axis=2, keepdims=True), field.sum(axis=1, keepdims=True)
     out = field + row * rows + column * columns
     if ghost > 0.0:
@@ -79,7 +78,7 @@ def leak(field: Array, row: float, column: float, ghost: float) -> Array:
 def compress(field: Array, exponent: float, knee: float) -> Array:
     """Pressure to signal: u^n (1 + k) / (u^n + k), which is 1 at a normal touch.
 
-    n > 1 ignores light touches, a small k saturates. What relaxation made negative stays as it is.
+    An exponent n > 1 weakens light touches, a small knee k saturates. Negative values, from relaxation, stay.
     """
     u = np.maximum(field, 0.0)
     if exponent != 1.0:
@@ -90,6 +89,6 @@ def compress(field: Array, exponent: float, knee: float) -> Array:
 
 
 def tail_kernel(n: int, reach: float) -> Array:
-    """A mixing matrix (n, n), rows of sum 1 at most: an exponential tail of `reach` taxels along an axis."""
+    """A mixing matrix (n, n) with rows of sum 1 at most: an exponential tail of `reach` taxels along an axis."""
     k = np.exp(-np.abs(np.subtract.outer(np.arange(n), np.arange(n))) / reach)
     return np.asarray(k / k[n // 2].sum())

@@ -1,4 +1,4 @@
-"""What lies, leans, brushes or crackles on a pad: palms, arms, objects, sleeves, folds, electrical noise."""
+"""Non-gestures that no fingertip makes: palms, arms, objects, sleeves, folds, electrical noise."""
 
 import math
 
@@ -24,9 +24,9 @@ def blob(
     unrest: float = 0.08,
     flatness: float = 1.2,
 ) -> Press:
-    """A contact that is no fingertip.
+    """A contact that is no fingertip, at x, y (mm) and times t (n,).
 
-    `size` are its standard deviations in mm, `fades_s` how long it comes and goes.
+    `size`: one standard deviation along and across, in mm; `fades_s`: how long it comes, and goes.
     """
     rng, total, ones = occasion.rng, float(t[-1]), np.ones_like(t)
     level = np.clip(t / min(fades_s[0], 0.45 * total), 0.0, 1.0)
@@ -37,13 +37,13 @@ def blob(
 
 
 def between(occasion: Occasion, *ranges: Pair) -> Pair:
-    """Two numbers from two ranges."""
+    """Two random numbers, one from each of two ranges."""
     (a, b), (c, d) = ranges
     return float(occasion.rng.uniform(a, b)), float(occasion.rng.uniform(c, d))
 
 
 def resting_hand(occasion: Occasion, duration_s: float) -> Press:
-    """The heel of the hand or an idle finger that lies lightly on the pad's edge during a gesture."""
+    """The heel of the hand, or an idle finger, that lies lightly on the pad's edge during a gesture."""
     rng, t = occasion.rng, grid(duration_s)
     side = 1.0 if occasion.person.right_handed else -1.0
     x = occasion.width * (0.5 + side * rng.uniform(0.3, 0.55))
@@ -54,7 +54,7 @@ def resting_hand(occasion: Occasion, duration_s: float) -> Press:
 
 
 def palm(occasion: Occasion) -> list[Press]:
-    """A flat hand: large contacts that land within 0.15 s (balls of the hand, finger roots, often one big patch)."""
+    """A flat hand: three to seven large patches that land within 0.15 s, often with one that is much larger."""
     rng = occasion.rng
     total = rng.uniform(0.2, 2.2)
     cx, cy = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height)
@@ -74,7 +74,7 @@ def palm(occasion: Occasion) -> list[Press]:
 
 
 def heel_rest(occasion: Occasion) -> list[Press]:
-    """The heel of the hand lies on an edge for seconds, heavy and large."""
+    """The heel of the hand lies heavily on an edge for seconds: a large patch, or two."""
     rng, t = occasion.rng, grid(occasion.rng.uniform(1.0, 4.0))
     edge = rng.uniform(-0.5, 0.5)
     places = [(edge, -0.42), (edge, 0.42), (-0.42, edge), (0.42, edge)]
@@ -103,7 +103,7 @@ def forearm(occasion: Occasion) -> list[Press]:
 
 
 def wipe(occasion: Occasion) -> list[Press]:
-    """A flat hand or a cloth wipes over: a large heavy patch crosses the pad, once or to and fro."""
+    """A flat hand or a cloth wipes over the pad: large heavy patches cross it, once or to and fro."""
     rng = occasion.rng
     t = grid(float(np.clip(rng.uniform(0.4, 2.5) / occasion.rate, 0.3, 3.5)))
     u = t / t[-1]
@@ -123,11 +123,11 @@ def wipe(occasion: Occasion) -> list[Press]:
 
 
 def object_put_down(occasion: Occasion) -> list[Press]:
-    """A thing is put down: a cup's ring, edges, a block, feet. Hard edges, no tremor, stays 0.4 to 5 s."""
+    """A thing is put down for 0.4 to 5 s: a cup's ring, edges, a block or feet, with hard borders and no tremor."""
     rng = occasion.rng
     t = grid(rng.uniform(0.4, 5.0))
     x, y = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height, beyond=0.2)
-    parts: list[tuple[float, float, Pair]]  # place and size
+    parts: list[tuple[float, float, Pair]]  # (x, y, size) of each part, mm from the middle
     form = int(rng.integers(4))
     if form == 0:
         radius, count = rng.uniform(12.0, 38.0), int(rng.integers(6, 13))
@@ -149,7 +149,7 @@ def object_put_down(occasion: Occasion) -> list[Press]:
 
 
 def sleeve_brush(occasion: Occasion) -> list[Press]:
-    """Cloth brushes over: one to four weak, large, ragged patches wander across in 0.3 to 1.8 s."""
+    """Cloth brushes over the pad: one to four weak, large, unsteady patches cross it in 0.3 to 1.8 s."""
     rng = occasion.rng
     total, heading = rng.uniform(0.3, 1.8), rng.uniform(-math.pi, math.pi)
     across = rng.uniform(0.5, 1.6) * occasion.small
@@ -179,7 +179,7 @@ def wrinkle(occasion: Occasion) -> list[Press]:
 
 
 def electrical_burst(occasion: Occasion) -> list[Artefact]:
-    """Interference for 0.05 to 1.5 s: on everything, on rows, columns, blocks, or scattered."""
+    """Interference for 0.04 to 3 s: on all taxels, a row, a column, a block or scattered taxels, up to four times."""
     rng = occasion.rng
     made, start = [], 0.0
     for _ in range(int(rng.integers(1, 5))):

@@ -1,7 +1,7 @@
-"""Short contacts of everyday life that nobody means: what grazes, pats, pokes, slides, fidgets and lands by mistake.
+"""Short contacts of everyday life that nobody means: bumps, grazes, pats, pokes, slides, folds, fidgeting, hands.
 
-The ranges are wide on purpose. Nobody has measured how a sleeve, a cup or a child meets a sensor, and a model that has
-learned one way in which a thing is drawn knows that drawing and not the thing.
+The ranges are wide on purpose: nobody has measured how a sleeve, a cup or a child touches a sensor, and a model that
+learns from one way to draw a thing recognises that drawing, not the thing.
 """
 
 import math
@@ -20,23 +20,23 @@ Places = Sequence[tuple[float, float]]  # mm
 
 
 def even(occasion: Occasion, low: float, high: float) -> float:
-    """A number between low and high, even on a logarithmic scale."""
+    """A random number between low and high, log-uniform."""
     return float(math.exp(occasion.rng.uniform(math.log(low), math.log(high))))
 
 
 def _oval(occasion: Occasion, low: float, high: float) -> tuple[float, float]:
-    """Length and width (mm, one standard deviation) of something that is up to twice as long as wide."""
+    """Length and width (mm, one standard deviation) of something at most twice as long as wide."""
     length = even(occasion, low, high)
     return length, length * float(occasion.rng.uniform(0.5, 1.0))
 
 
 def _fades(occasion: Occasion) -> tuple[float, float]:
-    """Seconds in which something comes and goes; each is independent of the other."""
+    """The seconds in which a contact comes and in which it goes, independent of each other."""
     return even(occasion, 0.02, 0.5), even(occasion, 0.02, 0.5)
 
 
 def _passage(occasion: Occasion, t: Array, length: float) -> tuple[Array, Array]:
-    """A bent way (n,) of so many mm over the pad, in any direction; it may begin or end beside the pad."""
+    """x, y (n,) in mm of a bent way of that length over the pad, in any direction; its ends may be beside the pad."""
     rng = occasion.rng
     way = stroke_progress(t / t[-1], rng, moving_ends=float(rng.random()))
     dx, dy = arc(way, length, float(rng.uniform(-math.pi, math.pi)), float(rng.normal(0.0, 0.5)))
@@ -86,7 +86,7 @@ def pat(occasion: Occasion) -> list[Press]:
 
 
 def poke(occasion: Occasion) -> list[Press]:
-    """A key or a pen, which stays for longer than a tap, or a buckle or a cup's edge, broader than a finger."""
+    """A key or a pen, longer than a tap, or a buckle or the edge of a cup, broader than a finger."""
     rng = occasion.rng
     x, y = occasion.spot(2.0, 2.0, beyond=0.2)
     made, start = [], 0.0
@@ -116,7 +116,7 @@ def slide(occasion: Occasion) -> list[Press]:
 
 
 def fold(occasion: Occasion) -> list[Press]:
-    """A coat, a bag or a blanket lies and moves: weak broad patches that come, wander and go for seconds."""
+    """A coat, a bag or a blanket lies and moves: weak broad patches come, wander and go for seconds."""
     rng = occasion.rng
     total = even(occasion, 0.8, 8.0)
     made = []
@@ -143,7 +143,7 @@ def hands(occasion: Occasion) -> list[Press]:
 
 
 def landing(occasion: Occasion) -> list[Press]:
-    """An arm or a hand that tries where to lie: it lands and lifts again, once to three times."""
+    """An arm or a hand lands and lifts again, once to three times, until it lies well."""
     rng = occasion.rng
     x, y = occasion.spot(1.0, 1.0, beyond=0.5)
     size, made, start = _oval(occasion, 8.0, 0.6 * occasion.small + 9.0), [], 0.0
@@ -159,12 +159,12 @@ def landing(occasion: Occasion) -> list[Press]:
 
 
 def fidget(occasion: Occasion) -> list[Press]:
-    """A finger, or two, that wander on the fabric while their owner thinks of something else."""
+    """One or two fingers wander on the fabric absent-mindedly."""
     return playing_rub(occasion, [occasion.spot(2.0, 2.0) for _ in range(int(occasion.rng.choice([1, 1, 1, 2])))])
 
 
 def playing_tap(occasion: Occasion, places: Places) -> list[Press]:
-    """One of the fingers that lie at these places lifts and falls."""
+    """One of the fingers at these places lifts and falls."""
     x, y = places[int(occasion.rng.integers(len(places)))]
     return [touch_down(occasion, x, y, even(occasion, 0.05, 0.6), 0.0, even(occasion, 0.2, 1.4))]
 
@@ -181,7 +181,7 @@ def playing_drum(occasion: Occasion, places: Places) -> list[Press]:
 
 
 def playing_rub(occasion: Occasion, places: Places) -> list[Press]:
-    """The fingers rub, scratch or wander about where they lie; all of them together, or one."""
+    """The fingers at these places rub, scratch or wander there, all together or one alone."""
     rng = occasion.rng
     total = even(occasion, 0.8, 6.0)
     t = grid(total)
@@ -217,7 +217,7 @@ def playing_stretch(occasion: Occasion, places: Places) -> list[Press]:
 
 
 SHORT: dict[str, Maker] = named(bump, graze, landing, pat, poke, slide, fold, fidget, hands)
-# What the fingers of a hand do that lie at given places.
+# By kind: what the fingers of a resting hand do, from an occasion and the places of the fingers.
 PLAYED: dict[str, Callable[..., list[Press]]] = named(
     playing_tap, playing_drum, playing_rub, playing_press, playing_stretch
 )

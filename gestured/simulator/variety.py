@@ -1,4 +1,4 @@
-"""Any sensor at all: wide domain randomisation, the part of this package on which strange sensors depend."""
+"""Random sensors of any nature (domain randomisation), from which models learn to work on strange sensors."""
 
 import math
 
@@ -7,18 +7,18 @@ import numpy as np
 from gestured.simulator.sensor import SimulatedSensor
 
 # Shares of the hardest sensors.
-FAINT = 0.3  # share of the hardest sensors whose touches are faint: 8 to 25 times the noise
-LINE_BURSTS = 0.15  # share of the hardest sensors where interference hits whole rows or columns for a frame
-LOSS_IN_STEP = 0.15  # share of the hardest sensors that lose frames at regular distances
+FAINT = 0.3  # touches are faint: 8 to 25 times the noise
+LINE_BURSTS = 0.15  # interference hits whole rows or columns for a frame
+LOSS_IN_STEP = 0.15  # frames are lost at regular distances
 
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number between low and high, even on a logarithmic scale."""
+    """A random number between low and high, log-uniform."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def _grid(rng: np.random.Generator, screen: bool) -> tuple[int, int]:
-    """Mostly 9 x 9, else 5 to 32 rows and columns, at most twice as long as wide; phones often 27 x 15."""
+    """Rows and columns: mostly 9 x 9, else 5 to 32, at most twice as long as wide; of screens often 27 x 15."""
     if rng.random() < 0.7:
         return 9, 9
     if screen and rng.random() < 0.6:
@@ -31,7 +31,7 @@ def _grid(rng: np.random.Generator, screen: bool) -> tuple[int, int]:
 
 
 def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Amplitudes and time constants: viscoelastic branches, firmware that smooths, a baseline that creeps."""
+    """Amplitudes and time constants (s) of viscoelastic branches, of smoothing, and of a baseline that follows."""
     branches = int(rng.integers(0, 4))
     amplitudes = [float(a) for a in rng.uniform(-0.12, 0.3, branches) * (0.3 + 0.7 * hard)]
     taus = [_log(rng, 0.01, 4.0) for _ in amplitudes]
@@ -41,21 +41,21 @@ def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tup
         amplitudes.append(float(rng.uniform(0.3, 0.75)))
         taus.append(_log(rng, 0.02, 0.12))
     if rng.random() < 0.2 * hard:
-        # Firmware whose baseline follows under the finger: a held touch fades and leaves a hollow.
+        # Firmware whose baseline follows under the finger, so that a held touch fades and leaves a hollow.
         amplitudes.append(-float(rng.uniform(0.05, 0.4)))
         taus.append(_log(rng, 0.8, 5.0))
     return tuple(amplitudes), tuple(taus)
 
 
 def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
-    """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles.
+    """A random sensor: a fifth are like touchscreens (sharp blobs, no offset, 8 bits), the others are textiles.
 
-    `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs.
+    `hardness`, from 0 (clean) to 1 (as bad as possible), scales all disturbances.
     """
     hard = min(max(hardness, 0.0), 1.0)
     screen = rng.random() < 0.22
     rows, columns = _grid(rng, screen)
-    # The pad measures 40 to 130 mm across whatever its grid: hands do not scale with taxels.
+    # The shorter side measures 45 to 120 mm with any grid, since hands do not scale with taxels.
     pitch = _log(rng, 45.0, 120.0) / min(rows, columns)
     rate = 15.0 * float(rng.normal(1.0, 0.03)) if rng.random() < 0.75 else _log(rng, 10.0, 100.0)
 
@@ -65,7 +65,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
     gain = float(rng.uniform(90.0, 220.0)) if screen else _log(rng, 40.0, 30000.0)
     snr = _log(rng, 300.0 * (8.0 / 300.0) ** hard if hard > 0 else 299.0, 300.0)
     if trouble(FAINT):
-        snr = _log(rng, 8.0, 25.0)  # a thin or a thickly covered textile: touches barely stand out
+        snr = _log(rng, 8.0, 25.0)  # a thin or thickly covered textile, on which touches barely stand out
     noise = 1.0 / snr
     lines = noise * float(rng.uniform(0.0, 0.8)) * hard
     relaxation, taus = _lags(rng, hard)
