@@ -1,6 +1,6 @@
 """`python3 deploy/licences.py FOLDER NAME` prints the copyright file of a package.
 
-FOLDER holds the Python packages that it brings, NAME is where it will be installed. It needs nothing but Python.
+FOLDER holds the Python packages that the package brings, NAME is where they will be installed. Python alone is needed.
 """
 
 import re
@@ -9,18 +9,18 @@ from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-FILES = ("licen", "copying", "notice", "thirdparty")  # how files begin that hold licences
+FILES = ("licen", "copying", "notice", "thirdparty")  # the names of files with licences begin with one of these
 
 
 def short(found: Distribution) -> str:
-    """A distribution's licence in a few words, as its metadata say; empty where they do not."""
+    """A distribution's licence in a few words, from its metadata; empty if these have none."""
     said = found.metadata["License-Expression"] or (found.metadata["License"] or "").strip()
     kinds = [line for line in found.metadata.get_all("Classifier", []) if line.startswith("License ::")]
     return said if said and "\n" not in said else ", ".join(line.rsplit(" :: ", 1)[1] for line in kinds)
 
 
 def main(folder: str, name: str) -> int | str:
-    """Print it, or say what a distribution lacks."""
+    """Print the copyright file; returns 0, or a sentence about a distribution that comes without its licence."""
     known = dict(
         re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", (HERE / "licences.txt").read_text(), re.MULTILINE | re.DOTALL)
     )

@@ -1,6 +1,6 @@
-"""`python -m deploy.release build OUT` makes the wheel and the sdist; `... ready` says what keeps them from a release.
+"""`python -m deploy.release build OUT` makes wheel and sdist, `sums OUT` their digests; `ready` checks for a release.
 
-It runs in the project's folder, with build and hatchling as deploy/locks/build.txt names them. It needs nothing else.
+Run it in the project's folder. It needs only build and hatchling, in the versions that deploy/locks/build.txt has.
 """
 
 import hashlib
@@ -14,17 +14,17 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-BESIDE = {".gitignore", "LICENSE", "NOTICE", "README.md", "pyproject.toml"}  # what the sdist holds beside the packages
+BESIDE = {".gitignore", "LICENSE", "NOTICE", "README.md", "pyproject.toml"}  # files of the sdist beside the packages
 
 
 def version(root: Path) -> str:
-    """The one place that says it."""
+    """The version, from the only place where it is written."""
     (found,) = re.findall(r'^__version__ = "(.+)"$', (root / "gestured" / "__init__.py").read_text(), re.MULTILINE)
     return str(found)
 
 
 def faults(number: str, changelog: str, changed: str, head: str, tagged: str) -> list[str]:
-    """What keeps a commit from being the release of this version; `tagged` is the commit of its tag, or empty."""
+    """Why the commit `head` cannot be released as version `number`; `tagged` is the commit of its tag, or empty."""
     found = []
     heading = (re.findall(r"^## (.+)$", changelog, re.MULTILINE) or ["nothing"])[0]
     if not re.fullmatch(rf"{re.escape(number)} - \d{{4}}-\d\d-\d\d", heading):
@@ -39,19 +39,19 @@ def faults(number: str, changelog: str, changed: str, head: str, tagged: str) ->
 
 
 def git(*arguments: str) -> str:
-    """What git says; nothing, where it fails."""
+    """The output of a git command; empty if it fails."""
     return subprocess.run(["git", *arguments], capture_output=True, text=True, check=False).stdout.strip("\n")
 
 
 def run(command: Sequence[str | Path], environment: dict[str, str]) -> None:
-    """Run it, silently where it works."""
+    """Run a command silently. If it fails, exit with its output."""
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode != 0:
         sys.exit(f"{done.stdout}{' '.join(map(str, command))} failed")
 
 
 def build(out: Path, epoch: int) -> list[Path]:
-    """Build the sdist of what git knows, and the wheel of that sdist."""
+    """Build the sdist from the files in git, and the wheel from the sdist; returns wheel and sdist."""
     environment = {**os.environ, "SOURCE_DATE_EPOCH": str(epoch)}
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
@@ -68,12 +68,12 @@ def build(out: Path, epoch: int) -> list[Path]:
 
 
 def shipped(tracked: Iterable[str]) -> set[str]:
-    """The files of the packages among those that git knows."""
+    """The files of the packages among those in git."""
     return {name for name in tracked if name.startswith(("gestured/", "models/"))}
 
 
 def strange(wheel: Path, sdist: Path, tracked: list[str]) -> list[str]:
-    """What is missing in either, or has no business there."""
+    """The files that are missing in wheel or sdist, or do not belong there."""
     ours = shipped(tracked)
     with zipfile.ZipFile(wheel) as archive:
         names = [re.sub("^gestured_models/", "models/", name) for name in archive.namelist()]
@@ -87,12 +87,12 @@ def strange(wheel: Path, sdist: Path, tracked: list[str]) -> list[str]:
 
 
 def sums(files: Iterable[Path]) -> str:
-    """Their digests, as `sha256sum --check` reads them."""
+    """The digests of files, as `sha256sum --check` reads them."""
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(files))
 
 
 def main(arguments: list[str]) -> int | str:
-    """Run the command; what is wrong, or 0."""
+    """Run the command; returns 0, or what is wrong."""
     match arguments:
         case ["ready"]:
             number = version(Path())

@@ -1,1 +1,1 @@
-"""What is made from the programs' own words: the example configuration, man pages and shell completions."""
+"""Files generated from settings and parsers: the example configuration, man pages, completions; also a dashboard."""

@@ -1,4 +1,4 @@
-"""`python -m deploy.generate configuration | dashboard | animation FILE` prints it, `install SHARE` writes the rest."""
+"""`python -m deploy.generate`: prints configuration, dashboard or animation; writes man pages and completions."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ from deploy.generate import animation, completion, configuration, dashboard, man
 
 
 def install(share: Path) -> None:
-    """Write man pages and completions below a `share` folder."""
+    """Write man pages and completions below the folder `share`."""
     for name, text in man.pages().items():
         put(share / "man" / f"man{name[-1]}" / name, text)
     for name, parser in programs.PARSERS.items():
@@ -17,7 +17,7 @@ def install(share: Path) -> None:
 
 
 def put(path: Path, text: str) -> None:
-    """Write a file and the folders above it."""
+    """Write a file, and make the folders above it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
 

@@ -1,4 +1,4 @@
-"""The animation on top of the README: a recording frame by frame, and what the daemon said when it said it."""
+"""The animation at the top of the README: the frames of a recording, and the daemon's answers at their times."""
 
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 
 from gestured.record.replay import frames_used, opened
 
-STOPS = ("00204d", "31446b", "666970", "958f78", "cab969", "ffea46")  # cividis: told apart without red and green
-LEVELS = 16  # shades: more cannot be seen, and cost room
+STOPS = ("00204d", "31446b", "666970", "958f78", "cab969", "ffea46")  # cividis, for eyes that see no red or green, too
+LEVELS = 16  # shades: more cannot be told apart, and make the file larger
 SIDE = 26  # pixels of a taxel
-LEFT, TOP = 20, 20  # pixels
-BEFORE_S, AFTER_S = 0.7, 1.6  # shown around the gestures
-IDLE_FRAMES = 15  # a second, of which the untouched sensor is known
-SHOWN = 4  # gestures
+LEFT, TOP = 20, 20  # pixels of the margins
+BEFORE_S, AFTER_S = 0.7, 1.6  # shown before the first onset, and after the last answer
+IDLE_FRAMES = 15  # the first frames, in which nobody touches the sensor: a second at 15 Hz
+SHOWN = 4  # the most gestures
 
 
 def animation(path: Path) -> str:
-    """A recording's first gestures as an SVG that plays for ever."""
+    """The first gestures of a tape as an SVG that repeats for ever. Raises RecordingError."""
     tape, known = opened(path)
     sensor, frames = next(iter(frames_used(tape, known.scene).items()))
     said = [e for e in tape.events if e["type"] == "gesture" and e["sensor"] == sensor][:SHOWN]
@@ -48,7 +48,7 @@ def animation(path: Path) -> str:
 
 
 def _matrix(levels: NDArray[np.int_], moments: NDArray[np.float64], length: float) -> list[str]:
-    """A square for each taxel, whose colour changes when its level does."""
+    """A square for each taxel, whose colour changes with its level."""
     colours = [_colour((n + 0.5) / LEVELS) for n in range(LEVELS)]
     drawn = []
     for row in range(levels.shape[1]):
@@ -70,7 +70,7 @@ def _matrix(levels: NDArray[np.int_], moments: NDArray[np.float64], length: floa
 
 
 def _text(words: list[tuple[str, float, float, float]], length: float, x: int) -> list[str]:
-    """Each answer from the moment on when it was told."""
+    """Each answer, shown from the time of its decision on."""
     drawn = [f'<text x="{x}" y="{TOP + 24}" fill="#9aa5b1" font-size="15">pressure in, gestures out</text>']
     for n, (gesture, confidence, moment, waited) in enumerate(words):
         y, after = TOP + 66 + 44 * n, f"{1000 * waited:.0f} ms after the finger left"

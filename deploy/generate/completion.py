@@ -1,4 +1,4 @@
-"""Completions for bash, zsh and fish: shtab makes them of the programs' parsers."""
+"""Completions for bash, zsh and fish, which shtab makes from the programs' parsers."""
 
 import argparse
 
@@ -6,7 +6,7 @@ import shtab
 
 from deploy.generate.programs import arguments, commands
 
-PATHS = ("FILE", "PATH", "FOLDER", "MODEL", "RECORDING")  # words in a metavar that mean something on disk
+PATHS = ("FILE", "PATH", "FOLDER", "MODEL", "RECORDING")  # words in a metavar that mean a file or a folder
 
 
 def completion(parser: argparse.ArgumentParser, shell: str) -> str:

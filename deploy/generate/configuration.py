@@ -1,4 +1,4 @@
-"""The example configuration: every key that the settings know, with its words and a value that is valid."""
+"""The example configuration: every key of the settings, with its description and a valid value."""
 
 import json
 import textwrap
@@ -17,7 +17,7 @@ from gestured.daemon.settings import (
     ZoneSettings,
 )
 
-# Values to show for keys that have none unless set, or whose default explains nothing.
+# Values to show for keys without a default, or whose default explains nothing.
 SHOWN: dict[str, Any] = {
     "fallback": ["lstm"],
     "publish": ["osc://127.0.0.1:9001"],
@@ -62,7 +62,7 @@ def literal(value: object) -> str:
 
 
 def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) -> list[Key]:
-    """The keys of one table. Raises KeyError for a key that has no default, no `examples` and nothing to show."""
+    """The keys of one table. Raises KeyError for a key without default, `examples` and a value in SHOWN."""
     found = []
     for name, field in part.model_fields.items():
         if name in leave_out:
@@ -79,12 +79,12 @@ def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) ->
 
 
 def words(name: str) -> str:
-    """What a key of the settings says of itself."""
+    """The description of a key of the settings."""
     return Settings.model_fields[name].description or ""
 
 
 def tables() -> dict[str, list[Key]]:
-    """Heading of a table ("" for the keys above all tables) -> its keys."""
+    """By heading of a table ("" for the keys above all tables): its keys."""
     use = literal(SHOWN["gestures"])
     return {
         "": keys(Settings, leave_out=(*TABLES, "gestures", "gates")),
@@ -100,7 +100,7 @@ def tables() -> dict[str, list[Key]]:
 
 
 def example() -> str:
-    """The whole file; without the mark before keys and tables it is valid, and says what the words say."""
+    """The whole file. Keys and tables are commented out; without these marks the file is valid, too."""
     lines = ["# " + line for line in HEAD.splitlines()]
     for table, found in tables().items():
         lines += ["", f"#{table}"] if table else []

@@ -4,14 +4,14 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-WIDTH = 24  # Grafana's columns
+WIDTH = 24  # columns of Grafana's grid
 SOURCE = {"type": "prometheus", "uid": "${source}"}
 RATE = "[$__rate_interval]"
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture. `queries` are (PromQL, legend)."""
+    """One panel. `queries` are pairs of PromQL and legend; width and height are in steps of Grafana's grid."""
 
     title: str
     queries: tuple[tuple[str, str], ...]
@@ -28,12 +28,12 @@ GOOD_AT_ZERO = ((None, "green"), (1.0, "red"))
 
 
 def stat(title: str, query: str, legend: str, unit: str = "short", **more: Any) -> Panel:
-    """A number at the top."""
+    """A panel with a number, for the top of the dashboard."""
     return Panel(title, ((query, legend),), "stat", unit, 4, 4, **more)
 
 
 def quantiles(metric: str) -> tuple[tuple[str, str], ...]:
-    """Median and 95th percentile of a histogram."""
+    """The queries for median and 95th percentile of a histogram."""
     rate = f"sum by (le) (rate({metric}_bucket{RATE}))"
     return tuple((f"histogram_quantile({q}, {rate})", name) for q, name in ((0.5, "median"), (0.95, "95 %")))
 
@@ -83,7 +83,7 @@ PANELS = (
 
 
 def dashboard() -> str:
-    """The JSON; panels flow from left to right."""
+    """The dashboard as JSON; its panels are laid out from left to right."""
     x = y = row = 0
     panels = []
     for number, panel in enumerate(PANELS, 1):

@@ -6,7 +6,7 @@ from deploy.generate import configuration
 from deploy.generate.programs import PARSERS, arguments, commands
 from gestured import __version__
 
-PROGRAMS = {  # name: section, summary
+PROGRAMS = {  # by name: section, summary
     "gestured": (8, "tactile gesture recognition daemon"),
     "gesturectl": (1, "operator's client of gestured"),
     "gestured-bridge": (1, "gestured on other buses, and serial sensors"),
@@ -15,33 +15,33 @@ FILE = "TOML. Flags win over GESTURED_* variables, these over the file. An unkno
 
 
 def escape(text: str) -> str:
-    """Text as roff shows it: no backslash, hyphen or leading dot means anything."""
+    """A text whose backslashes, hyphens, leading dots and apostrophes roff shows as they are."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line.startswith((".", "'")) else line for line in text.splitlines())
 
 
 def tagged(tag: str, text: str) -> list[str]:
-    """A paragraph under a bold tag."""
+    """The lines of a paragraph under a bold tag."""
     return [".TP", f"\\fB{escape(tag)}\\fR", escape(text)]
 
 
 def described(parser: argparse.ArgumentParser) -> list[str]:
-    """A program's arguments, and its examples as lines that are neither filled nor joined."""
-    words, lines = parser._get_formatter(), []  # argparse has no public way to ask
+    """The lines about a program's arguments and, unfilled, its examples."""
+    words, lines = parser._get_formatter(), []  # argparse has no public way to get these texts
     for action in arguments(parser):
         lines += tagged(words._format_action_invocation(action), words._expand_help(action))
     return [*lines, ".PP", ".nf", escape(parser.epilog), ".fi"] if parser.epilog else lines
 
 
 def synopsis(parser: argparse.ArgumentParser) -> str:
-    """How a program is called, in one line."""
+    """The call of a program in one line."""
     words = parser._get_formatter()
     names = [words._format_action_invocation(action) for action in arguments(parser) if not action.option_strings]
     return escape(" ".join([parser.prog, "[OPTION]...", *(["COMMAND", "..."] if commands(parser) else names)]))
 
 
 def program(name: str) -> list[str]:
-    """The body of a program's page."""
+    """The lines of the body of a program's page."""
     parser = PARSERS[name]()
     lines = [".SH SYNOPSIS", synopsis(parser), ".SH DESCRIPTION", escape(parser.description or "")]
     lines += [".SH OPTIONS", *described(parser)]
@@ -53,7 +53,7 @@ def program(name: str) -> list[str]:
 
 
 def file() -> list[str]:
-    """The body of the configuration file's page."""
+    """The lines of the body of the configuration file's page."""
     lines = [".SH DESCRIPTION", escape(FILE)]
     for table, keys in configuration.tables().items():
         lines.append(f'.SH "TABLE {escape(table.upper())}"' if table else ".SH KEYS")
@@ -63,7 +63,7 @@ def file() -> list[str]:
 
 
 def pages() -> dict[str, str]:
-    """File name -> page."""
+    """By file name: the page."""
     names = PROGRAMS | {"gestured.toml": (5, "configuration of the gestured daemon")}
     found = {}
     for name, (section, summary) in names.items():

@@ -1,4 +1,4 @@
-"""The programs that are installed, as their parsers describe them. argparse has no public way to ask."""
+"""The parsers of the installed programs, their arguments and subcommands, for which argparse has no public way."""
 
 import argparse
 
@@ -10,12 +10,12 @@ PARSERS = {"gestured": gestured, "gesturectl": gesturectl, "gestured-bridge": br
 
 
 def arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
-    """Flags and positional arguments that its help shows."""
+    """The flags and positional arguments that a parser's help shows."""
     actions = [action for action in parser._actions if not isinstance(action, argparse._SubParsersAction)]
     return [action for action in actions if action.help != argparse.SUPPRESS]
 
 
 def commands(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    """The parsers of its subcommands."""
+    """The parsers of a parser's subcommands."""
     found = [action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     return [command for choices in found for command in choices.values()]

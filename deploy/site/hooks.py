@@ -1,4 +1,4 @@
-"""What mkdocs asks while it builds the site."""
+"""The hooks that mkdocs calls while it builds the site."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ READ_ON = re.compile(r"^## Where to read on\n(.*?)^## ", re.MULTILINE | re.DOTAL
 
 
 def navigation(readme: str) -> list[dict[str, Any]]:
-    """The README's table "Where to read on": what a reader wants, and the pages for that."""
+    """The navigation, from the README's table "Where to read on": what a reader wants, and the pages for that."""
     (table,) = READ_ON.findall(readme)
     found: list[dict[str, Any]] = [{"gestured": "README.md"}]
     for wish, pages in re.findall(r"^\| (.+?) \| (.*\.md\).*) \|$", table, re.MULTILINE):
@@ -19,6 +19,6 @@ def navigation(readme: str) -> list[dict[str, Any]]:
 
 
 def on_config(config: Any) -> Any:
-    """Before anything is read."""
+    """Set the navigation, before mkdocs reads any page."""
     config.nav = navigation((Path(config.docs_dir) / "README.md").read_text())
     return config

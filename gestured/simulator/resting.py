@@ -16,7 +16,7 @@ from gestured.simulator.unmeant import Places, even
 
 STEP_S = 0.04  # time grid of what rests, in which nothing is faster than the road
 BREATH_HZ = 0.25  # an adult at rest
-ROAD_HZ = (1.0, 12.0)  # a body on a seat passes on no more of a road's spectrum (ISO 8608 falls with the square)
+ROAD_HZ = (1.0, 12.0)  # what a body on a seat passes on of a road's spectrum, which falls with the square (ISO 8608)
 RESEAT_S = 9.0  # mean time between two shifts of what rests; assumed
 LIFT_S = 40.0  # mean time between two moments in which what rests is lifted, partly or wholly; assumed
 BESIDE = 0.05  # of the pad's side: the middle of what rests may lie so far beyond the border; assumed
@@ -48,7 +48,7 @@ POSTURES = {
 
 
 def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[list[Press], Places]:
-    """The presses of a posture for `seconds`, shaken by the share `road`; and its fingers' places (mm) if a hand."""
+    """A posture's presses for `seconds`, shaken by the share `road` of its force; and where a hand's fingers lie."""
     posture, rng, small = POSTURES[name], occasion.rng, occasion.small
     t = np.linspace(0.0, seconds, max(8, math.ceil(seconds / STEP_S) + 1))
     course = _course(t, rng, posture, road)

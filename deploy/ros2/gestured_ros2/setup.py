@@ -1,4 +1,4 @@
-"""The package as colcon builds it."""
+"""The package's build, for colcon."""
 
 from setuptools import setup
 

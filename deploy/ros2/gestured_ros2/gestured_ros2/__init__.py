@@ -1,1 +1,1 @@
-"""Gestures of a gestured daemon as ROS 2 messages."""
+"""A ROS 2 node that publishes the events of a gestured daemon."""

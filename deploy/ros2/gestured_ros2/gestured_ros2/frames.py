@@ -1,12 +1,12 @@
-"""A frame from a `sensor_msgs/Image`."""
+"""Frames from messages of the type `sensor_msgs/Image`."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-ENCODING = "32FC1"  # as OpenCV calls one float32 a pixel
-SIDES = range(2, 65)
+ENCODING = "32FC1"  # OpenCV's name for one float32 a pixel
+SIDES = range(2, 65)  # rows and columns that a frame may have
 
 
 def values_of(image: Any) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""Events as messages of gestured_msgs, whose fields have the names that the event's JSON has."""
+"""Events as messages of gestured_msgs, whose fields have the names of the keys in an event's JSON."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 from gestured.core.errors import SettingsError
 
 TIME = "builtin_interfaces/Time"
-LIMITS = {TIME: 2**31, "uint8": 2**8, "uint32": 2**32, "uint64": 2**64}  # kind of a number -> what it is below
+LIMITS = {TIME: 2**31, "uint8": 2**8, "uint32": 2**32, "uint64": 2**64}  # by type: what numbers must be below
 
 
 def own_messages() -> dict[str, Any]:
-    """The message of each type of event that has one. Raises SettingsError where gestured_msgs is not there."""
+    """By type of event: its message. Raises SettingsError if the package gestured_msgs is not installed."""
     try:
         from gestured_msgs.msg import Gesture, Provisional, Status, Touch
     except ImportError:
@@ -19,9 +19,9 @@ def own_messages() -> dict[str, Any]:
 
 
 def filled(message: Any, event: Mapping[str, Any]) -> Any:
-    """The message with an event's values. What the event leaves out, or says as null, stays empty, 0 or false.
+    """The message with an event's values. Fields that the event does not have, or has as null, stay as they are.
 
-    Raises ValueError for a number that has no place in its field: ROS would send another one.
+    Raises ValueError for a number that does not fit its field, since ROS would send another one.
     """
     for name, kind in message.get_fields_and_field_types().items():
         value, field = event.get(name), getattr(message, name)

@@ -1,4 +1,4 @@
-"""The node `gestured`: a daemon's events as topics; if asked for, frames from a topic, and gates as services."""
+"""The node `gestured`: a daemon's events as topics and, by parameters, frames from topics and gates as services."""
 
 import signal
 import socket
@@ -36,22 +36,22 @@ from .messages import filled, own_messages
 
 EVENTS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-# A publisher of frames may be reliable or not. What waits while this machine is busy is not lost for that.
+# Best effort fits reliable publishers of frames, too; the depth keeps frames while this machine is busy.
 FRAMES = QoSProfile(depth=64, reliability=ReliabilityPolicy.BEST_EFFORT)
-WAITING = 1000  # lines of the daemon that wait for this node; then the oldest is lost
-SENSORS = 1000  # that have topics: whoever can send frames can invent names
+WAITING = 1000  # the most lines of the daemon that wait for this node; then the oldest is lost
+SENSORS = 1000  # the most sensors that have topics, since any sender of frames can invent names
 WARNED_S = 10.0  # from one warning of a kind to the next
-NONE = [""]  # the parameters' way to say an empty list of texts, which has no type
+NONE = [""]  # stands for an empty list of texts, which as the value of a parameter would have no type
 
 
-class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
-    """Mirrors one daemon. All of ROS happens in the thread that spins; another one reads the daemon's socket."""
+class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
+    """Mirrors one daemon. One thread spins, and alone calls ROS; another one reads the daemon's socket."""
 
     def __init__(self) -> None:
-        """Raises GesturedError for parameters that cannot be."""
+        """Raises GesturedError for parameters that cannot be used."""
         super().__init__("gestured")
-        self.fault: GesturedError | None = None  # why it has ended by itself
-        self.ended = Future()  # done, once it shall end
+        self.fault: GesturedError | None = None  # why the node has ended by itself
+        self.ended = Future()  # done as soon as the node is to end
         path, gates = self._text("socket", "/run/gestured/events.sock"), self._text("gates")
         self._types = self._texts("types", ["gesture"])
         sensors, gestures = self._texts("sensors"), self._texts("gestures")
@@ -61,8 +61,8 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         self._daemon = Daemon(sensors or None, gestures or None, counts)
         self._own = own_messages() if self.declare_parameter("messages", False).value else {}
         self._status = self._publisher("status", "~/status", LATEST)
-        self._topics: dict[tuple[str, str], Any] = {}  # sensor, type of event -> its publisher
-        self._with_topics: set[str] = set()  # sensors
+        self._topics: dict[tuple[str, str], Any] = {}  # publishers by sensor and type of event
+        self._with_topics: set[str] = set()  # sensors whose topics were made
         self._take_frames(self._texts("frames"), _address("to", self._text("to", "127.0.0.1:9000")))
         self._say_gone()
         self._lines: deque[Line] = deque(maxlen=WAITING)
@@ -79,7 +79,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         self._thread.start()
 
     def close(self) -> None:
-        """Hear no daemon any more."""
+        """End the subscription and its thread."""
         self._subscriber.close()
         self._thread.join()
 
@@ -94,12 +94,12 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
             for line in follow(self._subscriber, counts):
                 self._lines.append(line)
                 self._woken.trigger()
-        except GesturedError as error:  # what waiting does not mend
+        except GesturedError as error:  # such as a refused subscription, for which waiting does not help
             self.fault = error
             self._woken.trigger()
 
     def _take(self) -> None:
-        """What the daemon has said."""
+        """Take the lines that the daemon has sent, and publish them."""
         while self._lines:
             line = self._lines.popleft()
             self._daemon.take(line)
@@ -111,14 +111,14 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
                     self._gate.repeat(self._daemon.silent_by(self._gate.name), line["time"])
             elif line["type"] == GONE:
                 self._say_gone()
-            for sensor in self._daemon.states:  # before its first gesture, so that it has listeners then
+            for sensor in self._daemon.states:  # before its first gesture, so that it has subscribers then
                 self._make_topics(sensor)
         if self.fault is not None:
             self.get_logger().fatal(str(self.fault))
             self.ended.set_result(None)
 
     def _say_gone(self) -> None:
-        """What whoever comes late is told while no daemon is there."""
+        """Publish the status "gone", which late subscribers get while no daemon is there."""
         self._send(self._status, {"type": "status", "state": GONE, "sensors": {}, "time": time.time()})
 
     def _publisher(self, kind: str, topic: str, qos: QoSProfile) -> Any:
@@ -154,7 +154,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
             self._send(self._topics[sensor, kind], event)
 
     def _listen(self, gate: Gate, sensor: str, request: Any, response: Any) -> Any:
-        """Open our gate of a sensor, or close it."""
+        """Open or close this node's gate of a sensor: the callback of a service."""
         try:
             closed = gate.obey(sensor, ON if request.data else OFF)
             response.success, response.message = True, f"closed: {', '.join(closed)}" if closed else "it listens"
@@ -163,7 +163,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         return response
 
     def _take_frames(self, sensors: list[str], to: Address) -> None:
-        """Send frames of these sensors to the daemon."""
+        """Subscribe to the frames of these sensors, and send them to the daemon."""
         if not sensors:
             return
         family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
@@ -190,7 +190,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
             moment = stamp.sec + 1e-9 * stamp.nanosec or time.time()
             try:
                 heard = not sent_after_refusal(udp, form.packet(Frame(0.0, values), counter, moment))
-            except OSError:  # the network is down, or its queue full
+            except OSError:  # the network is down, or its queue is full
                 heard = False
             if not heard:
                 warn(f"nobody takes frames at {to}: start gestured, or name the parameter `to`")
@@ -199,7 +199,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
 
 
 class _Counts(Counts):
-    """Says in ROS's log what a bridge would say."""
+    """The counters of this bridge, which write to the log of ROS."""
 
     def __init__(self, logger: Any) -> None:
         super().__init__("ros2")
@@ -223,8 +223,8 @@ def _address(parameter: str, text: str) -> Address:
 
 
 def main() -> int:
-    """Run the node until it is ended. The exit status is 1 where waiting does not help."""
-    # A thread is told of signals: rclpy's own handlers end with a traceback what has not begun to spin.
+    """Run the node until it is ended; returns the exit status, which is 1 if waiting does not help."""
+    # A thread waits for signals, since rclpy's own handlers cause a traceback before the node spins.
     told, tells = socket.socketpair()
     tells.setblocking(False)
     signal.set_wakeup_fd(tells.fileno())
@@ -242,7 +242,7 @@ def main() -> int:
     threading.Thread(target=_end_when_told, args=(node.ended, told), daemon=True).start()
     try:
         executor.spin_until_future_complete(node.ended)
-    except ExternalShutdownException:  # ended as asked
+    except ExternalShutdownException:  # rclpy was shut down from outside
         pass
     finally:
         node.close()
