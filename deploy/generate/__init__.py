@@ -1,1 +1,1 @@
-"""Files generated from settings and parsers: the example configuration, man pages, completions; also a dashboard."""
+"""The generators of the example configuration, man pages, completions, the dashboard and the animation."""

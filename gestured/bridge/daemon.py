@@ -56,7 +56,7 @@ class Daemon:
         self._counts = counts
         self.hello: Line = {}  # empty while the daemon is away
         self.version = ""  # of the last daemon that was there
-        self.states: dict[str, str] = {}  # by sensor, in the order of news; kept while the daemon is away
+        self.states: dict[str, str] = {}  # by sensor, the latest news last; kept while the daemon is away
         self.gestures: list[str] | None = None  # None until the daemon has told them
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures

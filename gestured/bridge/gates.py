@@ -1,6 +1,6 @@
 """A gate that a bus closes and opens: the bridge passes its commands to the daemon's socket for bridges.
 
-Only the daemon keeps whether the gate is closed. The bridge repeats for which sensors it is, so that the daemon knows
+Only the daemon stores for which sensors the gate is closed. The bridge repeats these sensors, so that the daemon knows
 that bridge and bus are alive; without repetitions the gate stays closed, and the daemon reports it as overdue.
 """
 
@@ -20,7 +20,7 @@ ANSWER_S = 2.0  # the longest wait for the daemon, which answers in milliseconds
 
 
 class Gate:
-    """The gate of one name of all sensors of a daemon."""
+    """One gate, by its name, of all sensors of a daemon."""
 
     def __init__(self, path: Path, name: str, counts: Counts) -> None:
         """`path` is the daemon's socket for bridges."""

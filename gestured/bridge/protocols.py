@@ -55,7 +55,7 @@ class FlexiTac(Protocol):
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Whether the bytes have markers at even distances."""
+        """Words if the bytes have markers at even distances, else None."""
         places = [n for n in range(len(data) - 1) if data.startswith(FlexiTac.MARKER, n)]
         here = set(places)
         for at in places[:TRIED]:
@@ -99,7 +99,7 @@ class Csv(Protocol):
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Whether the bytes are lines of equally many numbers, but for a few damaged ones."""
+        """Words if the bytes are lines of equally many numbers, but for a few damaged ones, else None."""
         lines = data.split(b"\n")[1:-1]
         ((count, often),) = Counter(len(numbers(line)) for line in lines).most_common(1) or [(0, 0)]
         if count >= 4 and often >= FEWEST and often >= MOST_LINES * len(lines):

@@ -50,7 +50,7 @@ class OscSlip(Protocol):
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Whether the bytes are several OSC packets."""
+        """Words if the bytes are several OSC packets, else None."""
         packets = [message for each in data.split(SLIP_END)[1:-1] for message in messages_of(slip_decoded(each))]
         return f"osc-slip with messages to {packets[0].address}" if len(packets) >= FEWEST else None
 
@@ -72,7 +72,7 @@ class E256(OscSlip):
 
     @staticmethod
     def fits(data: bytes) -> str | None:
-        """Whether the bytes are several answers of an e256."""
+        """Words if the bytes are several answers of an e256, else None."""
         return "e256" if len(E256(*E256.grid).push(data)) >= FEWEST else None
 
 

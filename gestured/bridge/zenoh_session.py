@@ -18,7 +18,7 @@ ROUTER = "tcp/127.0.0.1:7447"  # the default address of a router on this machine
 CLIENT = '"client"'  # the mode of a session that connects to a router; in other modes, others may connect to it
 # Settings unless --config has them: no search for peers on the network.
 UNLESS_SAID = {"mode": "client", "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
-ALWAYS = {"transport/shared_memory/enabled": False}  # Zenoh opens no session if the systemd unit denies this to it
+ALWAYS = {"transport/shared_memory/enabled": False}  # else Zenoh opens no session under the systemd unit
 HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # the states of sensors whose frames come
 
 

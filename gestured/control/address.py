@@ -35,7 +35,7 @@ def control_path(args: argparse.Namespace) -> Path:
 
 
 def event_path(args: argparse.Namespace) -> Path:
-    """The event socket that `--socket` names, or that the daemon on `--control` tells. Raises Unreachable, Refused."""
+    """The event socket of `--socket`, or of the daemon on `--control`. Raises SettingsError, Unreachable, Refused."""
     if args.socket is not None:
         return Path(args.socket)
     control = args.control

@@ -51,5 +51,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         return program.run(parser(given), given)
     except KeyboardInterrupt:  # Ctrl-C during the imports, before anything was done
         return 1
-    except BrokenPipeError:  # the reader of our output, such as `head`, has ended
+    except BrokenPipeError:  # the reader of the output, such as `head`, has ended
         return 0

@@ -89,7 +89,7 @@ class Labelled:
                     raise RecordingError(
                         f"{self._path}: event_labels: recording {g} is a session whose events are not known"
                     )
-            # A gesture that is said of a non-gesture is false wherever it lies, so no onset needs to be known for it.
+            # The onset of a non-gesture need not be known, since any gesture during it is false.
             elif found.onsets is not None or label != NONE:
                 times = found.times_of(g)
                 first = stands_out(found.frames_of(g)) if found.onsets is None else int(found.onsets[g])

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
-    """One event as a line for a person; `before`, which this updates, has each sensor's last provisional event."""
+    """One event as a line for a person; each sensor's last provisional event is kept in `before` for its answer."""
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
     moment = next((event[key] for key in TIMES if event.get(key) is not None), time.time())

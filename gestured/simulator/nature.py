@@ -43,7 +43,7 @@ class Nature:
     clipped: bool = False  # the firmware subtracts the baseline and sends no negatives
     dead_zone: float = 0.0  # smaller values are sent as 0
     dead: int = 0  # number of taxels that show no touch
-    stuck: int = 0  # number of taxels that show a high value all the time
+    stuck: int = 0  # number of taxels that show the same, mostly high value all the time
     bursts_per_minute: float = 0.0
     line_bursts_per_minute: float = 0.0  # bursts that hit a whole row or column for one frame
     jitter_s: float = 0.003
