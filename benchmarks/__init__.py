@@ -1,1 +1,1 @@
-"""What speed costs and is worth, as ratios measured side by side: `make bench`."""
+"""Benchmarks: figures of speed, each beside a comparison that is measured in turn with it (`make bench`)."""

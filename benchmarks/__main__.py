@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the table of speed, such as `python -m benchmarks --only decode recognise`."""
+"""The table of speed: `python -m benchmarks`, or parts of it, as `python -m benchmarks --only decode recognise`."""
 
 import argparse
 import json
@@ -40,7 +40,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
 
 
 def machine() -> str:
-    """One line that says where this was measured."""
+    """One line about this machine: its processor, cores, Python and load."""
     found = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")]
     name = found[0].split(":")[1].strip() if found else platform.machine()
     return f"{name}, {os.cpu_count()} cores, Python {platform.python_version()}, load {os.getloadavg()[0]:.1f}"

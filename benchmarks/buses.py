@@ -1,4 +1,4 @@
-"""Bridges: how much later than at the Unix socket an event is there; and how much one router of Zenoh carries."""
+"""Bridges: how much later an event arrives over a bus than at the Unix socket, and what one Zenoh router carries."""
 
 import json
 import queue
@@ -19,9 +19,9 @@ from gestured.client.control import Control
 from gestured.client.engine import Engine
 from gestured.client.subscriber import Subscriber
 
-EVENTS = 200  # of each bus
-PAUSE_S = 0.02  # from one to the next: each is alone
-NAMES = 10_000  # sensors at one router
+EVENTS = 200  # that each bus carries
+PAUSE_S = 0.02  # s between two events, so that neither delays the other
+NAMES = 10_000  # sensors whose events one router carries
 PATIENCE_S = 20.0
 
 
@@ -42,7 +42,7 @@ def process(*command: str) -> Iterator["subprocess.Popen[str]"]:
 
 @contextmanager
 def bridge(*flags: str) -> Iterator[None]:
-    """A bridge, once it is connected to both sides."""
+    """Run a bridge; the context is entered once it is connected to both sides."""
     with process(sys.executable, "-m", "gestured.bridge", *flags) as started:
         assert started.stdout is not None and started.stdout.readline()
         yield
@@ -62,7 +62,7 @@ def session(mode: str, key: str, endpoint: str) -> Any:
 
 @contextmanager
 def over_socket(path: Path) -> Iterator["queue.Queue[float]"]:
-    """When each gesture is there, in monotonic seconds."""
+    """A queue of the times (monotonic s) at which gestures arrive at the Unix socket."""
     heard: queue.Queue[float] = queue.Queue()
 
     def hear() -> None:
@@ -118,7 +118,7 @@ def over_zenoh(path: Path) -> Iterator["queue.Queue[float]"]:
 
 
 def delays(model: str) -> dict[str, list[float]]:
-    """Bus -> milliseconds from an operator's `emit` to the event; each emit reaches all of them."""
+    """By bus, milliseconds from an operator's `emit` to its event; each `emit` reaches all buses."""
     found: dict[str, list[float]] = {"Unix socket": [], "MQTT": [], "Zenoh": []}
     with Engine(model, 9, 9) as engine, ExitStack() as stack:
         buses = {
@@ -137,7 +137,7 @@ def delays(model: str) -> dict[str, list[float]]:
 
 
 def latency(model: str) -> list[Row]:
-    """Each bus beside the Unix socket, event by event."""
+    """A row for each bus: its delay beside that of the Unix socket, event by event."""
     found = delays(model)
     base = found.pop("Unix socket")
     rows = []
@@ -149,7 +149,7 @@ def latency(model: str) -> list[Row]:
 
 
 def router() -> Row:
-    """An event of each of NAMES sensors, one after the other, through a router in its own process."""
+    """Send one event of each of NAMES sensors through a router in a process of its own."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     code = f"from benchmarks.buses import session; s = session('router', 'listen/endpoints', {endpoint!r})"
     code += "; print(1, flush=True); input()"
@@ -166,7 +166,7 @@ def router() -> Row:
                     for n in range(NAMES):
                         sender.put(f"gestured/site{n % 100}/s{n}/gesture", payload)
                         if n % 100 == 99:
-                            time.sleep(0.005)  # 20,000 a second at most, so that nothing is dropped for want of room
+                            time.sleep(0.005)  # at most 20,000 a second, so that no queue overflows
                     end = time.monotonic() + PATIENCE_S
                     while len(came) < NAMES and time.monotonic() < end:
                         time.sleep(0.01)
@@ -179,5 +179,5 @@ def router() -> Row:
 
 
 def buses(model: str) -> list[Row]:
-    """Both."""
+    """The rows of `latency`, and that of `router`."""
     return [*latency(model), router()]

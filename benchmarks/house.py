@@ -1,8 +1,8 @@
-"""How large the house is, and how many calls an idle frame makes (`python -m benchmarks.house`).
+"""How large the code is, and how many calls an idle frame makes (`python -m benchmarks.house`).
 
-Lines are those of `cat` and `wc -l` over the .py files of a folder. Classes are those of the modules of the core that
+Lines are counted as by `cat` and `wc -l` over the .py files of a folder. Classes are those of the modules that
 `core/hub.py` imports, directly or not. Calls are the `call` events of `sys.setprofile` from `Hub.receive` on, for one
-packet of 81 floats of a settled sensor that nobody touches, in a scene with nothing but a model.
+packet of 81 floats of a settled sensor that nobody touches, in a scene without options.
 """
 
 import ast
@@ -25,8 +25,8 @@ ROOT = Path(__file__).parents[1]
 PARTS = ("gestured", "gestured/core", "gestured/model", "gestured/record", "gestured/simulator", "gestured/client",
          "gestured/daemon", "gestured/control", "gestured/bridge", "gestured/lab", "tests", "experiments")  # fmt: skip
 GRID = (9, 9)
-PACKETS = 300  # after which a sensor's noise is known
-COUNTED = 30
+PACKETS = 300  # packets of the sensor, whose noise is known before the last of them
+COUNTED = 30  # packets at the end whose calls are counted
 
 
 def lines(part: str) -> tuple[int, int]:
@@ -36,7 +36,7 @@ def lines(part: str) -> tuple[int, int]:
 
 
 def hub_imports() -> set[Path]:
-    """The modules that `core/hub.py` imports."""
+    """The files of `core/hub.py` and of the modules that it imports, directly or not."""
     seen: set[Path] = set()
     todo = [ROOT / "gestured/core/hub.py"]
     while todo:
@@ -57,7 +57,7 @@ def _imports(file: Path) -> Iterator[Path]:
 
 
 def classes() -> int:
-    """How many classes stand in what `core/hub.py` imports."""
+    """How many classes `core/hub.py` and the modules that it imports define."""
     trees = (ast.parse(file.read_text()) for file in hub_imports())
     return sum(isinstance(node, ast.ClassDef) for tree in trees for node in ast.walk(tree))
 
@@ -71,7 +71,7 @@ def packet(values: NDArray[np.float64]) -> bytes:
 
 
 def idle_calls() -> list[int]:
-    """Calls of Python functions that each of some idle frames makes."""
+    """The number of Python calls for each of the last COUNTED idle frames."""
     hub, rng = Hub(Scene(("one_tap",), GRID), Mute(("one_tap",))), np.random.default_rng(0)
     counts: list[int] = []
     calls = 0
@@ -92,7 +92,7 @@ def idle_calls() -> list[int]:
 
 
 def main() -> None:
-    """Print it."""
+    """Print lines and modules of each folder, and both counts."""
     print(f"{'folder':<22}{'lines':>8}{'modules':>9}")
     for part in PARTS:
         if (ROOT / part).is_dir():
@@ -103,5 +103,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends it without a traceback
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the program without a traceback
     main()

@@ -1,4 +1,4 @@
-"""What an idle frame costs in the hub: alone, and among others of one read, beside each frame taken by itself."""
+"""What an idle frame costs in the hub: processed together with the others of its read, and by itself."""
 
 import time
 
@@ -13,8 +13,8 @@ from gestured.core.scene import Scene
 from gestured.record.replay import Mute
 
 SETTLE_S = 1.6  # s, after which each idle sensor is learned
-READS = 160  # reads whose cost is measured, after that
-NEVER = 1 << 30  # sensors, for `FEW`: so many never wait together, so each frame is taken by itself
+READS = 160  # reads after SETTLE_S whose cost is measured
+NEVER = 1 << 30  # a value for `FEW`: so many frames never wait together, so each is taken by itself
 
 
 def idle_frames() -> list[Row]:
@@ -35,7 +35,7 @@ def _row(sensors: int, side: int, rate_hz: float, values: str) -> Row:
 
 
 def _costs(sensors: int, side: int, rate_hz: float, values: str) -> tuple[list[float], list[float]]:
-    """us of processor time a frame of reads in turn, the hub as it is and one that takes each frame by itself."""
+    """Processor time of a frame (us), medians of eight groups of reads: the hub as it is, and each frame by itself."""
     rng = np.random.default_rng(0)
     base = rng.uniform(80, 160, (sensors, side, side))
     forms = [Form(f"s{n}", values) for n in range(sensors)]

@@ -1,4 +1,4 @@
-"""What can be measured inside one process: decoding, recognising, and giving an event to a thousand clients."""
+"""What can be measured inside one process: decoding, recognising, following, and sending an event to many clients."""
 
 import asyncio
 import socket
@@ -62,7 +62,7 @@ def decode() -> list[Row]:
 
 
 def _decode(figure: str, ours: Callable[[], object], theirs: Callable[[], object], frames: int = 1) -> Row:
-    """`ours` decodes so many `frames`, `theirs` one."""
+    """A row of CPU time for a frame; one call of `ours` decodes so many `frames`, one of `theirs` a single frame."""
     slow, fast = interleaved(lambda: cpu_us(theirs, 2_000), lambda: cpu_us(ours, 20_000 // frames) / frames, 9)
     found = ratio(slow, fast)
     return Row(
@@ -107,7 +107,7 @@ def recognise(model: str) -> Row:
 
 
 def follow() -> Row:
-    """A frame of a finger that is followed, against one of a finger that nobody follows, both in the hub."""
+    """What a frame costs in the hub: with a finger that is followed, against one that nobody follows."""
     rows, columns = np.mgrid[:9, :9]
     noise, form = np.random.default_rng(0).normal(0, 2, (2 * HELD, 9, 9)), Form("bench", plain=True)
     frames = [1000 + each for each in noise]
@@ -195,7 +195,7 @@ async def _subscribers() -> Row:
                 except BlockingIOError:
                     pass
 
-        for _ in range(3000):  # until those who do not read are full
+        for _ in range(3000):  # until the buffers of clients that read nothing are full
             server.publish(event, 0.0)
             await settle()
             bare()

@@ -1,4 +1,4 @@
-"""From the moment at which an answer is decided, as it says, to a client that has it; frames come 67 ms apart."""
+"""Latency from the decision of an answer, by the event's own time, to its arrival at a client, at 15 Hz."""
 
 import json
 import socket
@@ -21,7 +21,7 @@ SECONDS = 30.0
 
 @contextmanager
 def _lines(path: str, hear: Callable[[bytes, float], None], ask: bytes = b"") -> Iterator[None]:
-    """Meanwhile `hear` is given each line of a socket, and the monotonic second at which it came."""
+    """While the context lasts, call `hear` with each line of a socket and the time (monotonic s) at which it came."""
 
     def run() -> None:
         with sock.makefile("rb") as lines:
@@ -39,7 +39,7 @@ def _lines(path: str, hear: Callable[[bytes, float], None], ask: bytes = b"") ->
 
 
 def play(port: int, stream: list[bytes], rate_hz: float = RATE_HZ) -> list[float]:
-    """Send a stream at its pace; returns when each packet was sent, in monotonic seconds."""
+    """Send packets at `rate_hz`; returns the time (monotonic s) at which each was sent."""
     sent = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.connect(("127.0.0.1", port))
@@ -53,7 +53,7 @@ def play(port: int, stream: list[bytes], rate_hz: float = RATE_HZ) -> list[float
 
 
 def _ours(engine: Engine, stream: list[bytes]) -> float:
-    """The median of milliseconds from when an answer is decided to when it is there."""
+    """The median time (ms) from the decision of an answer to its arrival."""
     delays: list[float] = []
 
     def hear(line: bytes, at: float) -> None:
@@ -68,7 +68,7 @@ def _ours(engine: Engine, stream: list[bytes]) -> float:
 
 
 def _theirs(program: Program, path: str, stream: list[bytes]) -> float:
-    """The same of a program that answers each packet: from when that was sent."""
+    """The median time (ms) from a packet to its line, of a program that answers each packet."""
     heard: list[float] = []
     with _lines(path, lambda line, at: heard.append(at)):
         sent = play(program.ready["port"], stream)
@@ -76,7 +76,7 @@ def _theirs(program: Program, path: str, stream: list[bytes]) -> float:
 
 
 def latency(model: str) -> list[Row]:
-    """Against an echo that does nothing, and against the ordinary script."""
+    """The daemon's latency against that of an echo without any work, and against that of the ordinary script."""
     form = Form("bench", plain=True)
     ours, echoed, ordinary = [], [], []
     echo_at, script_at = free_socket(), free_socket()

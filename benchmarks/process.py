@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent.parent
 
 
 class Program:
-    """One of `programs/`, running; its first line of output is JSON. A context manager."""
+    """A running program of `programs/`, which is ready once its first line, JSON, is printed. A context manager."""
 
     def __init__(self, name: str, *arguments: str) -> None:
         command = [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]

@@ -17,18 +17,18 @@ from gestured.simulator import Take
 
 SECONDS = 300.0
 REPEATS = 5
-FASTER = 1000.0  # times real time at which the daemon is sent the same frames
+FASTER = 1000.0  # times real time: the speed at which the frames are sent to the daemon
 
 
 def replay(model: str) -> Row:
-    """Times real time of one sensor at 15 Hz, recognition included, and whether a daemon gives the same answers."""
+    """How much faster than real time one sensor at 15 Hz is recognised, and whether a daemon gives the same answers."""
     take, opened = touched(60, SECONDS), open_model(model)
     speeds, answers = [], []
     for _ in range(REPEATS + 1):
         start = time.process_time()
         answers = _answers(take, opened)
         speeds.append(SECONDS / (time.process_time() - start))
-    speeds = speeds[1:]  # the first one warms up
+    speeds = speeds[1:]  # the first run warms up
     heard = [event.get("gesture") for event in play(model, take, FASTER)[0]]
     same = "the same" if heard == answers else f"{len(heard)}, and others,"
     return Row(
@@ -42,7 +42,7 @@ def replay(model: str) -> Row:
 
 
 def _answers(take: Take, model: Model) -> list[str | None]:
-    """The gesture of each segment, None for unknown."""
+    """The gesture of each answer, or None for unknown."""
     recognizer = Sensor("bench", Scene(model.gestures, take.frames.shape[1:]), model)
     frames = zip(take.sensor_times, take.frames, strict=True)
     events = [event for t, values in frames for event in recognizer.push(Frame(float(t), values))]

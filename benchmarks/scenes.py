@@ -1,4 +1,4 @@
-"""What each scene pays for, beside the scene that has least: counted, and measured side by side."""
+"""What each scene costs beside the minimal one: instructions that are counted, and time and memory."""
 
 import os
 import socket
@@ -23,11 +23,11 @@ from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
-OSC = "osc://127.0.0.1:{port}"  # where somebody listens
+OSC = "osc://127.0.0.1:{port}"  # a socket that is open, but not read
 TUIO = "tuio://127.0.0.1:{port}"
 SCENES: dict[str, tuple[str, ...]] = {
     "minimal": (),
-    "metrics": ("--metrics", "127.0.0.1:0"),  # which nobody reads
+    "metrics": ("--metrics", "127.0.0.1:0"),  # nobody reads them
     "OSC out": ("--publish", OSC),
     "TUIO out": ("--touch", "true", "--publish", TUIO),  # fingers are followed
     "flight recorder": ("--flight-recorder", "4"),
@@ -52,7 +52,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one daemon in one round."""
+    """The cost of one daemon in one round."""
 
     start_s: float
     resident_kib: int
@@ -67,14 +67,14 @@ def table(model: str) -> str:
         listener.bind(("127.0.0.1", 0))
         found = _scenes(model, listener.getsockname()[1])
         counts = {name: scenes_counted.counted(one.model, one.flags, one.stream) for name, one in found.items()}
-        beside = _beside([_round(found) for _ in range(ROUNDS + 1)][1:])  # the first one warms up
+        beside = _beside([_round(found) for _ in range(ROUNDS + 1)][1:])  # the first round warms up
     passed, parsed = (_decoding(keep_touches) for keep_touches in (False, True))
     cost = f"decode of a bundle, with three finger positions against without: {passed}; if they were kept: {parsed}"
     return "\n\n".join((scenes_counted.table(counts), f"Measured on {date.today()}:", beside, cost))
 
 
 def _scenes(model: str, port: int) -> dict[str, Scene]:
-    """Each scene; all sensors do the same and send bundles with time tags."""
+    """The scenes by name; all their sensors show the same touches, and send bundles with time tags."""
     frames, plain, bundle = touched(40, SECONDS).frames, Form("bench", plain=True), Form("bench")
     epoch = time.time()
     alone = [dated(epoch + k / RATE_HZ, plain.packet(Frame(0.0, f), 0, 0.0)) for k, f in enumerate(frames)]
@@ -90,7 +90,7 @@ def _scenes(model: str, port: int) -> dict[str, Scene]:
 
 
 def _round(found: Mapping[str, Scene]) -> dict[str, Cost]:
-    """All scenes started one after the other, then fed in turn, so that the machine is as busy for each."""
+    """The cost of each scene's daemon; all run together and are fed in turn, so the machine is as busy for each."""
     with ExitStack() as stack:
         engines: dict[str, tuple[Engine, float]] = {}
         for name, scene in found.items():
@@ -117,7 +117,7 @@ def _round(found: Mapping[str, Scene]) -> dict[str, Cost]:
 
 
 def _beside(rounds: list[dict[str, Cost]]) -> str:
-    """Each scene beside the first, round by round: the median, the least and the most."""
+    """The table of costs beside the first scene: over the rounds, the median, the least and the most."""
     first = next(iter(rounds[0]))
     lines = [
         "| scene | start, times minimal | CPU, times minimal | resident, MiB more | threads | descriptors |",
@@ -142,7 +142,7 @@ def _beside(rounds: list[dict[str, Cost]]) -> str:
 
 
 def _decoding(keep_touches: bool) -> Ratio:
-    """CPU of a bundle of a matrix and three touches, over that of one of a matrix alone."""
+    """CPU time to decode a bundle of a matrix and three touches, over that of a bundle of the matrix alone."""
     decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=keep_touches)
     values = touched(40, 5.0).frames[0]
     matrix = Form("bench", plain=True).packet(Frame(0.0, values), 0, 0.0)
@@ -171,7 +171,7 @@ def subset(model: str) -> Row:
 
 
 def _wait(model: str, flags: tuple[str, ...]) -> float:
-    """Seconds from the last touched frame to the answer, of the sensor's clock: median of ten taps."""
+    """Seconds of the sensor's clock from the last touched frame to the answer: the median of eight of ten taps."""
     found = []
     with Engine(model, 9, 9, "--clock", "sensor", *flags) as engine:
         subscriber = Subscriber(engine.socket, types=["gesture", "unknown"])
@@ -186,7 +186,7 @@ def _wait(model: str, flags: tuple[str, ...]) -> float:
             play(engine.listen[1], packets)
         for event in iter(heard.get, None):
             found.append(event["decided"] - event["offset"])
-            if len(found) == 8:  # a light tap may pass unseen
+            if len(found) == 8:  # a light tap may be missed
                 break
         subscriber.close()
     return percentile(found, 0.5)

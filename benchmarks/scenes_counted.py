@@ -1,4 +1,4 @@
-"""What each scene leaves out, counted: Python's instructions for a frame, and the packages that it loads."""
+"""What each scene costs, counted: bytecode instructions for a frame, and the packages that it loads."""
 
 import json
 import socket
@@ -10,19 +10,19 @@ from typing import Any
 from benchmarks.process import Program, free_socket
 from gestured.core.address import Address
 
-AGAIN = 5  # counts of each frame, of which the least holds: one that waited on a busy machine goes a longer way
+AGAIN = 5  # counts of each frame, of which the lowest is used: waiting on a busy machine takes more instructions
 
 
 @dataclass(frozen=True)
 class Count:
-    """Of one scene: packages loaded, and instructions of each frame with all that follows from it."""
+    """The packages that one scene loads, and the instructions of each frame with all that follows from it."""
 
     packages: frozenset[str]
     frames: tuple[int, ...]
 
 
 def table(found: Mapping[str, Count]) -> str:
-    """Each scene beside the first."""
+    """The table of counts, each scene beside the first."""
     least = next(iter(found.values()))
     lines = [
         "| scene | instructions of a frame, mean | beside minimal | of the median frame | packages more | fewer |",
@@ -38,7 +38,7 @@ def table(found: Mapping[str, Count]) -> str:
 
 
 def counted(model: str, flags: tuple[str, ...], stream: list[bytes], again: int = AGAIN) -> Count:
-    """A daemon with these flags, which hears the stream, each packet when it is done with the one before."""
+    """Count a daemon with these flags; each packet of the stream is sent once the one before is done with."""
     found = [_once(model, flags, stream) for _ in range(again)]
     packages = frozenset(name.split(".")[0] for name in found[0][1])
     return Count(packages, tuple(map(min, zip(*(frames for frames, _ in found), strict=True))))

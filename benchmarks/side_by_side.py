@@ -1,4 +1,4 @@
-"""What a user would otherwise write, beside gestured: CPU of a frame and memory, at 15 Hz with cold caches."""
+"""gestured beside an ordinary script: CPU time of a frame, and memory, at 15 Hz with cold caches."""
 
 import socket
 

@@ -13,7 +13,7 @@ from gestured.core.frames import Frame
 from gestured.simulator import Participant, SimulatedSensor, generator, session
 
 SECONDS = 10.0
-SETTLE_S = 3.0  # before it is measured, in which the sensors are learned
+SETTLE_S = 3.0  # before the measurement, in which the sensors are learned
 
 
 def small(model: str) -> list[Row]:
@@ -31,7 +31,7 @@ def _row(model: str, sensors: int, rate_hz: float) -> Row:
 
 
 def _cost(model: str, sensors: int, rate_hz: float, *, pressed: bool) -> tuple[float, float]:
-    """(ms of processor time, voluntary context switches) a second of a daemon that hears so many sensors."""
+    """(ms of processor time, voluntary context switches) a second of a daemon with so many `sensors`."""
     count = round((SETTLE_S + SECONDS) * rate_hz)
     nominal = dataclasses.replace(SimulatedSensor.nominal(day=950), rate_hz=rate_hz)
     frames = [
@@ -55,6 +55,6 @@ def _cost(model: str, sensors: int, rate_hz: float, *, pressed: bool) -> tuple[f
 
 
 def _woken(pid: int) -> int:
-    """How often the threads of a process have slept so far (Linux)."""
+    """The voluntary context switches of all threads of a process so far (Linux)."""
     texts = [status.read_text() for status in Path(f"/proc/{pid}/task").glob("*/status")]
     return sum(int(text.split("\nvoluntary_ctxt_switches:")[1].split()[0]) for text in texts)

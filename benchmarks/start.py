@@ -1,4 +1,4 @@
-"""Start and memory, against the same imports alone."""
+"""Start time and memory of the daemon, against those of its imports and model alone."""
 
 import time
 
@@ -21,7 +21,7 @@ MORE = 200  # further sensors
 def start_and_memory(model: str) -> list[Row]:
     """Seconds from exec to ready, and resident memory once one sensor has been heard."""
     path = str(shipped().get(model, model))
-    open_model(path)  # one warm-up: the files are in the page cache
+    open_model(path)  # a warm-up, which brings the files into the page cache
     memory: dict[str, list[float]] = {"ours": [], "bare": []}
 
     def ours() -> float:
@@ -57,7 +57,7 @@ def imports() -> Row:
 
 
 def further_sensors(model: str) -> Row:
-    """KiB for each sensor more, 9 x 9 at 15 Hz, after three seconds of frames from all of them."""
+    """KiB for each further sensor of 9 x 9 at 15 Hz, after three seconds of frames from all of them."""
     with Engine(model, 9, 9, "--max-sensors", str(MORE + 1), "--clock", "sensor") as engine:
         first = _heard(engine, ["first"])
         all_of_them = _heard(engine, [f"more{n}" for n in range(MORE)])
@@ -68,7 +68,7 @@ def further_sensors(model: str) -> Row:
 
 
 def _heard(engine: Engine, names: list[str]) -> int:
-    """Send three seconds of frames from each sensor; KiB once the daemon has them all."""
+    """Send three seconds of frames from each sensor; returns the daemon's resident KiB once it lists all of them."""
     epoch = time.time()
     for k in range(45):
         for n, name in enumerate(names):

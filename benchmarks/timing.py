@@ -1,4 +1,4 @@
-"""Fair clocks on a noisy machine: what is compared is interleaved, medians are quoted with their spread."""
+"""Timing on a noisy machine: what is compared is measured in turn, and medians are given with their spread."""
 
 import os
 import time
@@ -11,19 +11,19 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table: ours against theirs, and what was to be reached."""
+    """One line of the table: gestured against a comparison, and the goal."""
 
     figure: str
     ours: str
     against: str
     ratio: str
     goal: str
-    reached: bool | None  # None where nothing was promised
+    reached: bool | None  # None if there is no goal
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """Of paired measurements: the median of the quotients, and the least and the most of them."""
+    """The quotients of paired measurements: their median, least and most."""
 
     median: float
     least: float
@@ -34,7 +34,7 @@ class Ratio:
 
 
 def ratio(over: list[float], under: list[float]) -> Ratio:
-    """Of measurements taken in turn."""
+    """The quotients of measurements that were taken in turn."""
     found = sorted(a / b for a, b in zip(over, under, strict=True))
     return Ratio(median(found), found[0], found[-1])
 
@@ -54,7 +54,7 @@ def interleaved(a: Callable[[], float], b: Callable[[], float], repeats: int) ->
 
 
 def delay_ms(event: Mapping[str, Any], heard: float) -> float:
-    """Milliseconds from when an answer was decided, or a frame began a contact, to `heard`, in monotonic s."""
+    """Milliseconds from the decision of an answer, or from the onset of a contact, to `heard` (monotonic s)."""
     epoch = time.time() - time.monotonic()
     return 1e3 * (heard - (float(event.get("decided", event["onset"])) - epoch))
 
@@ -72,6 +72,6 @@ def resident_kib(pid: int) -> int:
 
 
 def percentile(values: list[float], share: float) -> float:
-    """The value below which `share` of them lie."""
+    """The value below which a `share` of the values lies."""
     ordered = sorted(values)
     return ordered[min(int(share * len(ordered)), len(ordered) - 1)]

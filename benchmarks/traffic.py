@@ -23,9 +23,9 @@ from gestured.simulator import Participant, SimulatedSensor, Take, generator, se
 
 RATE_HZ = 15.0
 SECONDS = 15.0
-START_S = 5.0  # in which many sensors are made, and settle: what is lost then is told apart
+START_S = 5.0  # s in which many sensors are made and learned; packets lost then are given apart
 SENSORS = 64  # that send together
-ROOM = 256 << 10  # bytes that may wait in the kernel: more, and the sender waits
+ROOM = 256 << 10  # bytes that may wait in the kernel before the sender pauses
 
 
 def touched(number: int, seconds: float) -> Take:
@@ -42,7 +42,7 @@ def idle(number: int, frames: int) -> NDArray[np.float64]:
 
 
 def packets(turn: int, epoch: float, pressed: int) -> list[bytes]:
-    """SECONDS of SENSORS in turn, of which `pressed` are touched; the stream began at `epoch` s, `turn` turns ago."""
+    """Packets of SENSORS sensors for SECONDS, of which `pressed` are touched; turn 0 began at `epoch` s."""
     count = round(SECONDS * RATE_HZ)
     values = [touched(n, SECONDS).frames[:count] if n < pressed else idle(n, count) for n in range(SENSORS)]
     forms = [Form(f"bench{n}") for n in range(SENSORS)]
@@ -63,7 +63,7 @@ def waiting(port: int) -> tuple[int, int]:
 
 
 def pour(sock: socket.socket, port: int, stream: list[bytes]) -> int:
-    """Send as fast as the receiver takes it; returns how many were lost. One socket: a sensor has one source."""
+    """Send packets as fast as the receiver takes them, all from `sock`, one source; returns how many were lost."""
     before = waiting(port)[1]
     for start in range(0, len(stream), 128):
         for packet in stream[start : start + 128]:
@@ -76,12 +76,12 @@ def pour(sock: socket.socket, port: int, stream: list[bytes]) -> int:
 
 
 def cpu_s_when_done(pid: int) -> float:
-    """Seconds of CPU that a process has used once it does nothing more: what it has read may still wait in it."""
+    """Seconds of CPU that a process has used, once its work on all packets is done."""
     before = cpu_s_of(pid)
     while True:
         time.sleep(0.05)
         now = cpu_s_of(pid)
-        if now - before < 0.005:  # timers are cheaper
+        if now - before < 0.005:  # timers use less
             return now
         before = now
 
@@ -98,7 +98,7 @@ def datagrams(model: str, pressed: int, goal: float, repeats: int = 5) -> Row:
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock,
     ):
         epoch = time.time()
-        # Made before, since a sensor that is silent for a second is learned anew.
+        # The streams are made beforehand, since a sensor that is silent for a second is learned anew.
         streams = [packets(turn, epoch, pressed) for turn in range(repeats + 1)]
         left = {engine.pid: iter(streams), empty.process.pid: iter(streams)}
 
@@ -124,7 +124,7 @@ def datagrams(model: str, pressed: int, goal: float, repeats: int = 5) -> Row:
 
 
 def _many(number: int) -> Iterator[list[bytes]]:
-    """The packets of each sensor: one in ten is touched, by five people, each at another moment of their session."""
+    """The packets of each sensor; one in ten is touched, by one of five people, from some moment of the session on."""
     sessions = [touched(n, 30.0).frames for n in range(5)]
     for n in range(number):
         form = Form(f"s{n}", plain=True)
@@ -133,7 +133,7 @@ def _many(number: int) -> Iterator[list[bytes]]:
 
 
 def _send(port: int, number: int, seconds: float, pipe: Connection) -> None:
-    """Be `number` sensors at 15 Hz, evenly spread; reports when it begins, and when it has ended."""
+    """Send as `number` sensors at 15 Hz, evenly spread; `pipe` gets the times (monotonic s) of begin and end."""
     streams = list(_many(number))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.connect(("127.0.0.1", port))
@@ -150,7 +150,7 @@ def _send(port: int, number: int, seconds: float, pipe: Connection) -> None:
 
 @contextmanager
 def _one_core(pid: int) -> Iterator[None]:
-    """A process has the first core, and what this one does and starts has the others, as far as there are any."""
+    """Give a process the first core, and this process and its children the others, if there are any."""
     mine = os.sched_getaffinity(0)
     first, *others = sorted(mine)
     os.sched_setaffinity(pid, {first})
@@ -162,7 +162,7 @@ def _one_core(pid: int) -> Iterator[None]:
 
 
 def sensors(model: str, number: int, seconds: float = 25.0) -> Row:
-    """Sensors at 15 Hz on one core: loss, and the time from an answer to the event once all have settled."""
+    """Sensors at 15 Hz on one core: packets lost, and the time from a decision to its event once all have settled."""
     with Engine(model, 9, 9, "--max-sensors", str(number)) as engine, _one_core(engine.pid):
         subscriber = Subscriber(engine.socket, types=["gesture", "unknown"])
         heard: list[tuple[float, float]] = []  # monotonic s, and ms since the answer was decided
@@ -180,7 +180,7 @@ def sensors(model: str, number: int, seconds: float = 25.0) -> Row:
         ours, theirs = context.Pipe()
         sender = context.Process(target=_send, args=(port, number, seconds, theirs))
         sender.start()
-        theirs.close()  # if the sender dies, we are told
+        theirs.close()  # so that `recv` fails if the sender dies
         settled = ours.recv() + START_S
         time.sleep(settled - time.monotonic())
         at_start, cpu = waiting(port)[1] - before, cpu_s_of(engine.pid)

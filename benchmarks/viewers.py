@@ -1,4 +1,4 @@
-"""What the daemon notices of those who look on: the delay of its events with three viewers, and without."""
+"""What viewers cost the daemon: the delay of its events with three viewers, and with none."""
 
 import socket
 import subprocess
@@ -17,7 +17,7 @@ from gestured.client.subscriber import Subscriber
 from gestured.core.frames import Frame
 
 VIEWERS = 3
-SENSORS = 20  # all of them are touched: so many events that a 99th percentile says something
+SENSORS = 20  # all touched, for enough events for a 99th percentile
 SECONDS = 12.0
 ROUNDS = 6
 WARM = 30  # frames
@@ -26,7 +26,7 @@ TYPES = ["onset", "gesture", "unknown"]
 
 @contextmanager
 def viewer(control: str, sensor: str) -> Iterator[int]:
-    """`gesturectl view`, its process, with one browser that looks at a sensor."""
+    """Run `gesturectl view` with one browser that views a sensor; gives its process id."""
     command = [sys.executable, "-m", "gestured.control", "view", "--control", control, "--listen", "127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -43,7 +43,7 @@ def viewers(model: str) -> list[Row]:
     takes = [touched(40 + n, SECONDS).frames for n in range(SENSORS)]
     count = 0
     daemon_ms: dict[int, list[float]] = {0: [], VIEWERS: []}  # of processor time in a second, by the number of viewers
-    viewers_ms: list[float] = []  # the same of all viewers together
+    viewers_ms: list[float] = []  # ms of processor time in a second, of all viewers together
 
     def play(sender: socket.socket, frames: int) -> None:
         nonlocal count
@@ -61,9 +61,9 @@ def viewers(model: str) -> list[Row]:
         def measure(watchers: int) -> float:
             delays: list[float] = []
             with ExitStack() as stack:
-                play(sender, 1)  # so that there is something to look at
+                play(sender, 1)  # so that the daemon knows the sensor
                 looking = [stack.enter_context(viewer(control, "bench0")) for _ in range(watchers)]
-                play(sender, WARM)  # what the pause has left behind is over
+                play(sender, WARM)  # until the effect of the pause is over
                 subscriber = stack.enter_context(Subscriber(engine.socket, types=TYPES))
 
                 def hear() -> None:
@@ -73,7 +73,7 @@ def viewers(model: str) -> list[Row]:
                 listener = threading.Thread(target=hear, daemon=True)
                 listener.start()
                 began, before = time.monotonic(), [cpu_s_of(pid) for pid in (engine.pid, *looking)]
-                play(sender, min(len(frames) for frames in takes))  # a sensor misses a frame now and then
+                play(sender, min(len(frames) for frames in takes))  # takes differ in length, since sensors lose frames
                 after, took = [cpu_s_of(pid) for pid in (engine.pid, *looking)], time.monotonic() - began
                 ours, *theirs = (1e3 * (b - a) / took for a, b in zip(before, after, strict=True))
                 daemon_ms[watchers].append(ours)

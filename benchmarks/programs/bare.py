@@ -1,4 +1,4 @@
-"""The imports that the daemon cannot do without, and its model opened: what start and memory are held against."""
+"""numpy, onnxruntime and an opened model, without a daemon: the comparison for start and memory."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A browser that looks at a sensor: it comes in by the address of `gesturectl view`, and reads all that comes."""
+"""A browser that views a sensor: it opens the address that `gesturectl view` prints, and reads the stream."""
 
 import http.client
 import json

@@ -1,8 +1,8 @@
-"""The daemon, counted: how many of Python's own instructions its packets take, and which packages it has loaded.
+"""The daemon with a counter: how many bytecode instructions its packets take, and which modules it has loaded.
 
-A count says what is done, however busy the machine is. What numpy, onnxruntime and the kernel do within one instruction
-is not in it, nor what timers do beside the packets. Prints the daemon's line, one for each reading of packets
-([packets, whether some wait still, instructions]), and the names of all modules once it has ended.
+A count does not depend on how busy the machine is. It leaves out what numpy, onnxruntime and the kernel do within one
+instruction, and what timers do apart from packets. The output is the daemon's line, one line for each reading of
+packets ([packets, whether more wait, instructions]), and at the end the names of all modules.
 """
 
 import json
@@ -18,7 +18,7 @@ read, receive = Receiver.read, Receiver._receive
 
 
 def traced(frame: FrameType, event: str, _: Any) -> Any:
-    """Called for each instruction of each of Python's frames."""
+    """Trace function that counts the instructions of each Python frame."""
     global count
     if event == "opcode":
         count += 1
@@ -28,7 +28,7 @@ def traced(frame: FrameType, event: str, _: Any) -> Any:
 
 
 def counted(receiver: Receiver) -> None:
-    """In the place of `Receiver.read`: all that is done with packets is done in it."""
+    """Replaces `Receiver.read`, within which all work on packets is done."""
     global count, found
     count = found = 0
     sys.settrace(traced)
@@ -40,7 +40,7 @@ def counted(receiver: Receiver) -> None:
 
 
 def taken(receiver: Receiver) -> Any:
-    """In the place of `Receiver._receive`."""
+    """Replaces `Receiver._receive`, to count packets."""
     global found
     packets, stamps, full = receive(receiver)
     found += len(packets)

@@ -8,7 +8,7 @@ import os
 from importlib import import_module
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
-import_module("gestured.daemon")  # what it sets for numpy and pydantic holds here too
+import_module("gestured.daemon")  # its settings for numpy and pydantic apply here too
 
 
 def loop() -> object:
