@@ -1,1 +1,1 @@
-"""What answers a question once: programs that print tables, beside the package and its tests."""
+"""Experiments: programs that answer one question with a table, outside of the package and its tests."""

@@ -2,7 +2,7 @@
 
     python -m experiments.beside --document docs/limits-and-choices.md
 
-Simulated people, of whom no model has learned; nothing that rests covers the way of the swipe.
+The people are simulated, and no model has learned from them; what rests never covers the way of the swipe.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from gestured.simulator.resting import rest
 
 LAID = ("forearm", "elbow", "hand", "thing")
 WAITS_S = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 30.0)
-FREE_S = 5.0  # the sensor has been idle for so long when something is laid on
+FREE_S = 5.0  # s for which the sensor is idle before something is laid on
 SWIPES = ("swipe_left", "swipe_right", "swipe_up", "swipe_down")
 ROAD = 0.06  # as on the armrest of gestured/simulator/places.py
 MODEL = "cnn_lstm"
@@ -51,7 +51,7 @@ def case(name: str, wait: float, n: int) -> Stretch:
 
 
 def heard(count: int, which: int) -> list[Heard]:
-    """What the model says of `count` people, of one thing and one wait."""
+    """The model's answers to `count` people, for cell `which` of the table: one thing, and one wait."""
     name, wait = LAID[which // len(WAITS_S)], WAITS_S[which % len(WAITS_S)]
     return [hear(case(name, wait, n), at(MODEL, USUAL)[:1], USUAL) for n in range(count)]
 

@@ -1,4 +1,4 @@
-"""Sensors with few counts: a gesture's peak in 2 to 100 steps, through the whole path.
+"""Sensors with few counts: gestures whose peak has 2 to 100 counts, through the whole path.
 
 python -m experiments.coarse --document docs/numerics.md
 """
@@ -19,14 +19,14 @@ PEAKS = (2, 3, 4, 6, 10, 30, 100)  # counts
 
 
 def with_peak(stream: Series, counts: int) -> Series:
-    """The same in whole counts, of which its peak above the idle sensor has so many."""
+    """A series in whole counts, scaled so that its peak above the idle sensor is so many `counts`."""
     idle = np.median(stream.frames, axis=0)
     unit = float((stream.frames - idle).max()) / counts
     return Series(stream.times, np.rint(stream.frames / unit))
 
 
 def coarse_table(models: Mapping[str, Classifier], count: int) -> Table:
-    """Each peak on so many simulated gestures: share of takes that are named rightly, by model."""
+    """A row for each peak: shares of `count` simulated gestures that each model names rightly, and wrongly."""
     takes = list(simulated_series(count))
     changes = {"as it is": [stream for _, stream in takes]}
     changes |= {f"{peak} counts": [with_peak(stream, peak) for _, stream in takes] for peak in PEAKS}

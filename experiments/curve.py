@@ -1,10 +1,10 @@
-"""How much of the way from a simulation to real people `gestured-lab adapt` goes, by the number of people it is given.
+"""How far `gestured-lab adapt` goes from a simulation towards real people, by the number of people that it is given.
 
     python -m experiments.curve --cache .cache/lab --real FOLDER
 
-The base is the network that `gestured-lab train` had before it saw anybody real; it is taken from the cache of a
-training, as are the networks that left out a third of the real subjects each. Of the subjects that one of these has not
-seen, each is judged by the base, by the base adapted with some of the others, and by the training's own network.
+The base is the network that `gestured-lab train` had before it saw anybody real. It is taken from the cache of a
+training, and so are the networks that each left out a third of the real subjects. The subjects that such a network has
+not seen judge the base, the base adapted with some of the other subjects, and the network itself.
 """
 
 import argparse
@@ -24,46 +24,46 @@ from gestured.lab.nets import Judged
 from gestured.lab.train import REAL_FILES, Trained, TrainingPlan, calibration_set, folds, judged, learn, load_data
 
 NAME = "cnn_lstm"
-PEOPLE = (1, 2, 4, 6)  # that a model is adapted with
+PEOPLE = (1, 2, 4, 6)  # numbers of people with whom a model is adapted
 BASE, SHIPPED = "nobody (simulation alone)", "shipped model's training"
-WRONG = 0.01  # share of wrong ones at which all are compared, besides the base's own
+WRONG = 0.01  # share of wrong answers at which all are compared, besides that of the base
 
 
 def of_people(own: Own, chosen: NDArray[np.int64]) -> Own:
-    """The part of some people."""
+    """The part of `own` that is of the people `chosen`."""
     rows, lost = np.isin(own.samples.people, chosen), np.isin(own.missed[:, 0], chosen)
     return replace(own, samples=own.samples.take(rows), sittings=own.sittings[rows], missed=own.missed[lost])
 
 
 @dataclass
 class Said:
-    """What a model, or one of its kind for each group of people, says of all people that judge."""
+    """The answers of a model, or of one model for each group of people, to all people that judge it."""
 
     every: list[Answers] = field(default_factory=list)
-    published: list[Answers] = field(default_factory=list)  # with confidence 1 at the model's own threshold, else 0
+    published: list[Answers] = field(default_factory=list)  # confidence 1 from the model's own threshold on, else 0
 
     def add(self, model: Judged, least: float, judges: Own) -> None:
-        """Ask a model that publishes from a confidence of `least` on."""
+        """Add the answers of a model that publishes from a confidence of `least` on."""
         said = opinions(model, judges.samples).answers(model.decision, model.verifier)
         self.take(Answers.of(judges.samples, said, judges.missed[:, 0]), least)
 
     def take(self, found: Answers, least: float) -> None:
-        """One group's answers."""
+        """Add the answers to one group of people."""
         self.every.append(found)
         self.published.append(replace(found, confidence=(found.confidence >= least).astype(np.float64)))
 
     def shares(self) -> Shares:
-        """At the model's own threshold."""
+        """The shares at the model's own threshold."""
         return together(self.published).shares(0.5)
 
     def right_at(self, wrong: float) -> Interval:
-        """Where so many are wrong."""
+        """The share of right answers at the threshold at which the share `wrong` is wrong."""
         every = together(self.every)
         return every.shares(every.least_for(wrong)).right
 
 
 def together(parts: list[Answers]) -> Answers:
-    """The rows of all."""
+    """The answers to all groups, as one."""
     names = [one.name for one in fields(Answers)]
     return Answers(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -84,7 +84,7 @@ def table(said: dict[str, Said]) -> str:
 
 
 def main() -> None:
-    """The command line."""
+    """Print the table after each group of people."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cache", type=Path, default=CACHE, help="of a training (%(default)s)")
     parser.add_argument("--real", type=Path, required=True, metavar="FOLDER", help="of the real recordings")
@@ -94,7 +94,7 @@ def main() -> None:
     data = load_data(plan, args.cache, args.real, 2)
     assert data.real is not None, f"{args.real}: expected {' and '.join(REAL_FILES)}"
     alone = replace(data, real=None)
-    simulated = learn(plan, alone, args.cache)  # the stage before real people, which all share
+    simulated = learn(plan, alone, args.cache)  # the stage before real people, which all networks share
     base, calibration, _ = judged(simulated, NAME, calibration_set(simulated, alone))
     trained = learn(plan, data, args.cache)
     calibrated = calibration_set(trained, data)

@@ -1,13 +1,13 @@
-"""What the front end cuts of sessions whose truth is known: `python -m experiments.cuts`.
+"""How the front end cuts sessions whose gestures are known: `python -m experiments.cuts`.
 
     python -m experiments.cuts --level nominal hard faint --sessions 100
     python -m experiments.cuts --foreign --level nominal hard --sessions 100
 
-Short sessions of one person each on one sensor each, of this project's simulator or of the independent one (which
-judges: nothing is tuned on it). A gesture is `one` if exactly one segment lies in it, and that
-segment in no other gesture; `split` if several do, `joined` if its segment holds another gesture too, `missed` if none
-does. Onsets and offsets are seconds after the true ones, of gestures that are one segment, at the quantiles 0.1, 0.5
-and 0.9. `false` are segments of nobody, an hour.
+The sessions are short, each of one person on one sensor, by this project's simulator or by the independent one, on
+which nothing is tuned. A gesture is `one` if exactly one segment lies in it, and that segment lies in no other gesture;
+`split` if several segments lie in it; `joined` if its segment lies in another gesture too; `missed` if none does.
+Onsets and offsets are seconds after the true ones, of gestures that are one segment, at the quantiles 0.1, 0.5 and 0.9.
+`false` are segments an hour in which nothing was performed.
 """
 
 import argparse
@@ -31,14 +31,14 @@ from gestured.simulator import Participant, SimulatedSensor, any_sensor, generat
 SESSION_S = 20.0
 NON_GESTURE_SHARE = 0.25
 HARDNESS = 0.6, 1.0
-FAINT = 8.0, 25.0  # times the noise, of a usual touch
+FAINT = 8.0, 25.0  # of a usual touch, times the noise
 IDLE_S = 0.9, 3.0
-EDGE_S = 0.07  # a frame at the model's rate: a contact is known to one frame only
+EDGE_S = 0.07  # s, a frame at the model's rate, since a contact's ends are known only to the frame
 LEVELS = ("nominal", "hard", "faint")
 
 
 class Recording(NamedTuple):
-    """Raw frames with the truth."""
+    """Raw frames of a session, and what was performed in it."""
 
     frames: NDArray[np.generic]  # (N, R, C)
     times: NDArray[np.float64]  # (N,) s
@@ -46,7 +46,7 @@ class Recording(NamedTuple):
 
 
 def ours(level: str, seed: int) -> Recording:
-    """A session of the project's own simulator: `hard` sensors are any, `faint` ones show little above their noise."""
+    """A session of the project's simulator: `hard` is any sensor, `faint` one whose touches hardly exceed its noise."""
     rng = generator(seed, 0xC075, LEVELS.index(level))
     sensor = SimulatedSensor.nominal(day=seed)
     if level != "nominal":
@@ -63,7 +63,7 @@ def ours(level: str, seed: int) -> Recording:
 
 
 def lossy(recording: Recording, burst: int, seed: int) -> Recording:
-    """The same without so many frames in a row somewhere in each performance."""
+    """A recording without `burst` frames in a row somewhere in each performance."""
     rng, keep = np.random.default_rng([seed, burst]), np.ones(len(recording.times), dtype=bool)
     for act in recording.performed:
         at = int(np.searchsorted(recording.times, rng.uniform(act.onset, act.offset)))
@@ -81,17 +81,17 @@ def others(level: str, seed: int) -> Recording:
 
 @dataclass
 class Sheet:
-    """What was counted."""
+    """The counts of some sessions."""
 
     gestures: int = 0
     cuts: Counter[str] = field(default_factory=Counter)  # one, split, joined, missed
-    cut: Counter[str] = field(default_factory=Counter)  # right, wrong, lost: named as the front end cuts
-    best: int = 0  # the best score is right
+    cut: Counter[str] = field(default_factory=Counter)  # right, wrong, lost: gestures, by the answers to their segments
+    best: int = 0  # gestures of one segment whose best score is right
     onsets: list[float] = field(default_factory=list)
     offsets: list[float] = field(default_factory=list)
     others: int = 0  # non-gestures
-    accepted: int = 0  # of them, taken for a gesture
-    false: int = 0  # segments of nobody
+    accepted: int = 0  # non-gestures that were taken for a gesture
+    false: int = 0  # segments in which nothing was performed
     hours: float = 0.0
 
     def __iadd__(self, other: "Sheet") -> "Sheet":
@@ -120,7 +120,7 @@ class Sheet:
 
 
 def measure(recording: Recording, model: Any) -> Sheet:
-    """One session."""
+    """Count one session."""
     frames, times, performed = recording
     sheet = Sheet(hours=float(times[-1]) / 3600)
     machine = Sensor("cuts", Scene(model.gestures, frames.shape[1:]), model)

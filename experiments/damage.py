@@ -1,10 +1,10 @@
 """How often a damaged gesture is wrong, for each fault: `python -m experiments.damage`.
 
-Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
-gestures; a fault damages what the sensor sends, or when it is served; the daemon's own backlog and hub take it at
-times that are written down, so that the same seed gives the same numbers at any speed. "Damaged" are the gestures
-during which a packet or frame was not what it should have been, or waited while the daemon stood still. An untouched
-sensor has the same fault for as long: any gesture there is one too many.
+Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform gestures. A
+fault damages what the sensor sends, or delays the daemon. The daemon's own backlog and hub take the packets at
+prescribed times, so the same seed gives the same numbers on any machine. A gesture is damaged if a packet or frame was
+altered during it, or waited while the daemon stood still. An untouched sensor has the same fault for as long: each
+gesture on it is false.
 """
 
 import argparse
@@ -43,9 +43,9 @@ from tests.hostile.grammar import violations
 from tests.hostile.line import Line
 
 SESSION_S = 120.0
-FIRST = 2000  # the participant; nobody whom training, calibration or evaluation know
+FIRST = 2000  # the first participant; training, calibration and evaluation use none from here on
 SOURCE = ("127.0.0.1", 40000)
-BEFORE_S, AFTER_S = 0.1, 0.2  # frames around a contact that are part of its segment or of its end
+BEFORE_S, AFTER_S = 0.1, 0.2  # s around a contact whose frames belong to its segment, or decide its end
 
 
 @dataclass
@@ -55,10 +55,10 @@ class Row:
     fault: str
     gestures: int = 0
     damaged: Counter[str] = field(default_factory=Counter)  # by verdict
-    others: Counter[str] = field(default_factory=Counter)  # gestures that the fault left alone
-    more: int = 0  # gestures published where none was performed
+    others: Counter[str] = field(default_factory=Counter)  # by verdict, of gestures that the fault left alone
+    more: int = 0  # gestures published while none was performed
     untouched_minutes: float = 0.0
-    untouched: int = 0  # gestures of nobody
+    untouched: int = 0  # gestures on the untouched sensor
     unended: int = 0  # violations of the events' grammar
 
     def figures(self) -> dict[str, Any]:
@@ -79,17 +79,17 @@ def _share(part: int, whole: int) -> float | None:
 
 
 def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> Take:
-    """What somebody, or nobody, does on a healthy sensor."""
+    """A session of somebody, or of nobody, on a healthy sensor."""
     sensor = replace(SimulatedSensor.nominal(day=participant), loss=0.0)
     rng = generator(participant, 0xFA)
     return session(Participant(participant), sensor, rng, seconds, 0.0, kinds=None if touched else [])
 
 
 class Bench:
-    """The daemon's backlog and hub, at times that are written down."""
+    """The daemon's backlog and hub, at prescribed times."""
 
     def __init__(self, model: str) -> None:
-        # Nothing here may depend on how fast this machine is: no rung is ever too slow.
+        # The events must not depend on the speed of this machine, so no rung is ever too slow.
         self._ladder = ladder_for(model, [], slow_s=math.inf)
         self._scene = scene_of(load_settings({"model": model}, {})[0], self._ladder)
 
@@ -99,12 +99,12 @@ class Bench:
         stalls: Sequence[Stall] = (),
         states: list[tuple[float, str]] | None = None,
     ) -> list[dict[str, Any]]:
-        """What the daemon says to (time in s, packet), in order of arrival, as a client's lines.
+        """The daemon's events for (time in s, packet) in order of arrival, as a client's lines.
 
-        `states` is given the time (s) and the state of each sensor at each tick.
+        The time (s) and the state of each sensor at each tick are appended to `states`.
 
-        In a stall it neither reads nor looks at a clock. After each group of packets that waited, it looks whether a
-        sensor has fallen silent: its loop may do so after any of them.
+        In a stall the daemon neither reads packets nor ticks. After each group of packets that waited it ticks again,
+        since its loop may do so after any of them.
         """
 
         def awake(t: float) -> float:
@@ -132,16 +132,16 @@ class Bench:
 
 @dataclass(frozen=True)
 class Damaged:
-    """What arrives of a take."""
+    """What a fault makes of a take."""
 
     arrivals: list[tuple[float, bytes]]  # (time in s, packet) in order
     stalls: list[Stall]  # of the daemon
-    struck: np.ndarray  # times of the frames that are not what, or not served when, they should have been
-    felt: Callable[[float], float]  # when what happened at a time of the take happens now
+    struck: np.ndarray  # (n,) s, times of the frames that were altered, or not served in time
+    felt: Callable[[float], float]  # from a time (s) of the take to that of the same moment with the fault
 
 
 def damage(fault: Fault, healthy: Take, seed: int) -> Damaged:
-    """A take with a fault."""
+    """Apply a fault to a take."""
     rng = np.random.default_rng(seed)
     line = Line(fault.line, seed)
     form = Form("arm", plain=not fault.counted)
@@ -170,7 +170,7 @@ def damage(fault: Fault, healthy: Take, seed: int) -> Damaged:
 
 
 def measure(name: str, takes: list[Take], idle: list[Take], bench: Bench) -> Row:
-    """One fault on all takes."""
+    """The figures of one fault on all takes."""
     row, fault = Row(name), FAULTS[name]
     for seed, healthy in enumerate(takes):
         damaged = damage(fault, healthy, seed)
@@ -200,7 +200,7 @@ def measure(name: str, takes: list[Take], idle: list[Take], bench: Bench) -> Row
 
 
 def main() -> int:
-    """Print the table; 1 where nobody made a gesture, or an onset has no end."""
+    """Print the table; returns 1 if the untouched sensor gave a gesture, or if an onset has no end."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="path or name (default: cnn_lstm)")
     parser.add_argument("--people", type=int, default=10, help="two minutes each, touched and untouched (default: 10)")

@@ -1,7 +1,7 @@
-"""How long a sensor is deaf after its frames were rubbish: `python -m experiments.deaf`.
+"""How long a sensor is deaf, its gestures unrecognised, after it sent bad frames: `python -m experiments.deaf`.
 
-Simulated people gesture on the nominal sensor, as in `experiments.damage`; for a while, at the start or in the
-middle, its frames are something else. The daemon's own backlog and hub take them.
+Simulated people gesture on the nominal sensor, as in `experiments.damage`; for a while, at the start or in the middle,
+its frames are replaced by bad ones. The daemon's own backlog and hub take them.
 """
 
 import argparse
@@ -30,7 +30,7 @@ SESSION_S = 100.0
 BOOT_S = 1.2  # how long a sensor takes to send what it should
 MIDDLE_S = 20.0  # when frames become bad that were good
 NOISE = 10.0  # counts, one standard deviation of what the nominal sensor shows from frame to frame
-SINCE_S = (0.0, 3.0, 10.0, 20.0, 60.0)  # the last bad frame: the columns
+SINCE_S = (0.0, 3.0, 10.0, 20.0, 60.0)  # s since the last bad frame: the columns
 Array = NDArray[np.float64]
 Shares = Array  # (n,) how much of the bad time has passed, 0..1
 Change = Callable[[Array, Shares, np.random.Generator], Array]  # (n, R, C) sound frames -> bad ones
@@ -38,7 +38,7 @@ Change = Callable[[Array, Shares, np.random.Generator], Array]  # (n, R, C) soun
 
 @dataclass(frozen=True)
 class Bad:
-    """Frames that are something else for a while."""
+    """Bad frames, which a sensor sends for a while."""
 
     begins_s: float
     lasts_s: float
@@ -46,7 +46,7 @@ class Bad:
     stays: bool = False  # the level stays where the last bad frame had it
 
     def stream(self, frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-        """What the sensor sends instead."""
+        """The sensor's stream with its bad frames."""
         share = (times - times[0] - self.begins_s) / self.lasts_s
         bad = (share >= 0) & (share < 1)
         sent = frames.astype(np.float64)
@@ -104,19 +104,19 @@ def take(person: int) -> Take:
 
 @dataclass
 class Heard:
-    """What became of a take: each gesture's beginning (s) and whether it was answered rightly; the rest."""
+    """What became of a take's gestures, and the states of its sensor."""
 
-    gestures: list[tuple[float, bool]]
-    more: int  # gestures published where none was performed
+    gestures: list[tuple[float, bool]]  # onset (s), and whether the answer was right
+    more: int  # gestures published while none was performed
     states: list[tuple[float, str]]  # of the sensor, at each tick (s)
 
     def first(self, after: float) -> float:
-        """When the first gesture since then (s) begins that is answered rightly; infinite where none is."""
+        """The onset (s) of the first gesture from `after` s on that is answered rightly; infinite if there is none."""
         return next((t for t, right in self.gestures if right and t >= after), math.inf)
 
 
 def hear(healthy: Take, bad: Bad, seed: int, bench: Bench) -> Heard:
-    """One take, with bad frames."""
+    """Play one take, with bad frames."""
     heard, tally = Heard([], 0, []), Tally()
     for event in healthy.events:
         tally.begin(Performed(event.label, event.kind, event.onset_s, event.offset_s))
@@ -132,9 +132,9 @@ def hear(healthy: Take, bad: Bad, seed: int, bench: Bench) -> Heard:
 
 
 def figures(name: str, takes: list[Take], sound: list[Heard], bench: Bench) -> dict[str, Any]:
-    """One row."""
+    """The row of one kind of bad frames, against the same takes without any (`sound`)."""
     bad, deaf, ok, more = BAD[name], list[float](), list[float](), 0
-    right = {since: list[bool]() for since in (-math.inf, *SINCE_S)}  # of gestures that begin then, or later
+    right = {since: list[bool]() for since in (-math.inf, *SINCE_S)}  # by seconds since the last bad frame
     for seed, healthy in enumerate(takes):
         begins = float(healthy.sensor_times[0]) + bad.begins_s
         over = begins + bad.lasts_s

@@ -1,9 +1,9 @@
-"""How early and how rightly a model speaks: provisional events over whole sessions, held against what was performed.
+"""How early, and how often rightly, a model answers: provisional events of whole sessions against what was performed.
 
     python -m experiments.early --model cnn_lstm --minutes 20
 
-Frames go through a whole `Sensor` as in the daemon, and nothing is cut by hand. So what begins alike counts: a tap may
-become a double tap, and a scribble begins as a swipe.
+Frames go through a whole `Sensor` as in the daemon, and nothing is cut by hand. So gestures that begin alike count: a
+tap may become a double tap, and a scribble begins as a swipe.
 """
 
 import argparse
@@ -52,14 +52,15 @@ class Ahead:
 
     minutes: float = 0.0
     people: int = 0  # sessions: each is another person's
-    moved_s: list[float] = field(default_factory=list)  # first right word about each, after its last touched frame
-    tap_s: list[float] = field(default_factory=list)  # the same of single taps
-    # By name of a share one pair for each thing counted: whether it was so, and whose session it was in. `right` and
-    # `wrong` count gestures, `early` those that are no taps, `confirmed` provisional events of these, `taps` of taps.
+    moved_s: list[float] = field(default_factory=list)  # s from a moving gesture's last touched frame to its right name
+    tap_s: list[float] = field(default_factory=list)  # as `moved_s`, of single taps
+    # By share, a pair for each case: whether the share counts it, and the number of its session. Cases are gestures for
+    # `right` and `wrong`, gestures that are no taps for `early`, provisional events of a single tap for `taps`, and all
+    # other provisional events for `confirmed`.
     counted: dict[str, list[tuple[bool, int]]] = field(default_factory=lambda: {name: [] for name in SHARES})
 
     def add(self, events: Sequence[Event], acts: Iterable[Truth], minutes: float) -> None:
-        """Count what was said in one session."""
+        """Count the events of one session."""
         self.minutes, self.people = self.minutes + minutes, self.people + 1
         said = {event.id: event for event in events if isinstance(event, Provisional)}
         answers = [event for event in events if isinstance(event, Gesture | Unknown)]
@@ -98,7 +99,7 @@ class Ahead:
         self.counted[name].append((so, self.people))
 
     def cells(self) -> tuple[Value, ...]:
-        """A row of `HEAD`; a dash where there is nothing to divide by."""
+        """A row of `HEAD`; a dash for a share or median of nothing."""
         some = {name: _share(counted) for name, counted in self.counted.items()}
         count = {name: len(counted) for name, counted in self.counted.items()}
         rate = (count["confirmed"] + count["taps"]) / self.minutes

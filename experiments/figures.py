@@ -1,10 +1,10 @@
 """`make figures`: every generated table of the documents, by the command that its own line names.
 
-    make figures ARGS=--stale                 what was made of other models or of other code, and why
-    make figures ARGS="--real ~/capfingerid"  make those again, one after the other; what is up to date is left alone
+    make figures ARGS=--stale                 list tables made of other models or other code, and why
+    make figures ARGS="--real ~/capfingerid"  make these tables again, one after the other
 
-An interrupted pass goes on where it was: what a command has written is up to date, and what a command only prints lies
-in build/figures with the models and the code that it was made with. Each command's duration is printed.
+An interrupted pass can be continued: a table that was written is up to date, and what a command only prints is kept in
+build/figures for its models and code. Each command's duration is printed.
 """
 
 import argparse
@@ -64,7 +64,7 @@ def with_data(command: str, real: Path | None) -> list[str] | str:
 
 
 def run(one: Made, words: list[str]) -> bool:
-    """Run a command and keep what it prints; whether it ended well."""
+    """Run a command, and keep its output if it writes no page; true if it ended well."""
     of = f"{one.command} {decides()} {[file_digest(path) for path in shipped().values()]}"
     key = hashlib.sha256(of.encode()).hexdigest()
     kept, before, start = KEPT / f"{key[:12]}.txt", one.page.read_bytes(), time.monotonic()
@@ -85,7 +85,7 @@ def run(one: Made, words: list[str]) -> bool:
 
 
 def main() -> int:
-    """List what is stale, or make it again; 1 where something is or remains so."""
+    """List stale tables, or make them again; returns 1 if any is or remains stale."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stale", action="store_true", help="list tables made of other models or code; make none")
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="the folder of real recordings")

@@ -1,7 +1,7 @@
 """Several instances on one machine, one of which is killed: what the others lose, and when its sensors are back.
 
 `python -m experiments.fleet --instances 4 --sensors 1000 --rate 15` prints it as JSON. Each sensor is untouched, has
-a port of its own, sends steadily, and counts its frames. What is killed is started again, as systemd does it.
+a port of its own, sends steadily, and counts its frames. The killed instance is started again, as by systemd.
 """
 
 import argparse
@@ -28,13 +28,13 @@ from tests.encoding import message
 
 FRAMES = 64  # different idle frames; they repeat
 DESCRIPTORS = 4096
-ASK_S = 0.1  # between two looks at how many are back: an answer about 250 sensors takes the daemon some milliseconds
+ASK_S = 0.1  # s between two requests for the status, each of which takes a daemon of 250 sensors some milliseconds
 RESTART_S = 0.1  # as RestartSec= of the unit
 
 
 @dataclass
 class Instance:
-    """A daemon that is started again where it dies, and its sensors."""
+    """A daemon, which can be started again, and its sensors."""
 
     folder: Path
     model: object
@@ -45,20 +45,20 @@ class Instance:
     sent: int = 0
 
     def start(self) -> None:
-        """On the same port as before."""
+        """Start the daemon, on the port that it had before."""
         self.daemon = Daemon.start(
             self.folder, self.model, "--listen", self.listen, "--max-sensors", len(self.names) + 8, "--stale-s", 30
         )
         self.listen = self.daemon.ready["listen"]
 
     def connect(self) -> None:
-        """A port for each sensor: each is an owner of its own."""
+        """Open a socket for each sensor, since each is to have a source of its own."""
         for _ in self.names:
             self.sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
             self.sockets[-1].connect(self.daemon.address)
 
     def status(self) -> dict[str, Any]:
-        """What it says of itself; empty while it is away."""
+        """The daemon's status; empty while it does not run."""
         try:
             with Control(self.daemon.socket.with_suffix(".ctl")) as control:
                 return control.ask("status")
@@ -66,17 +66,17 @@ class Instance:
             return {}
 
     def ready(self) -> int:
-        """How many of its sensors are heard and learned."""
+        """How many of the sensors are heard and learned."""
         return sum(sensor["state"] == "ok" for sensor in self.status().get("sensors", {}).values())
 
 
 class Senders:
-    """A thread that sends a frame of every sensor at the rate; late frames go out at once."""
+    """A thread that sends a frame of every sensor at the rate; late frames are sent at once."""
 
     def __init__(self, instances: list[Instance], rate: float) -> None:
         random = np.random.default_rng(0)
         noise = [20 + random.integers(-1, 2, (9, 9)) for _ in range(FRAMES)]
-        # A thousand packets are to be made at once: what they have in common is made before.
+        # A thousand packets are due at once, so what they have in common is made beforehand.
         self._heads = [[message(f"/{name}/pressure", "ib") for name in each.names] for each in instances]
         self._blobs = [struct.pack(">i81s3x", 81, values.astype(np.uint8).tobytes()) for values in noise]
         self._instances, self._period = instances, 1 / rate
@@ -100,13 +100,13 @@ class Senders:
             time.sleep(max(pause, 0.0))
 
     def stop(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._stop.set()
         self._thread.join()
 
 
 def until(condition: Any, patience_s: float = 60.0) -> float:
-    """Seconds until it holds."""
+    """Wait until a condition holds; returns the seconds. Raises TimeoutError after `patience_s`."""
     begin = time.monotonic()
     while not condition():
         if time.monotonic() > begin + patience_s:
@@ -116,14 +116,14 @@ def until(condition: Any, patience_s: float = 60.0) -> float:
 
 
 def lost_frames(instance: Instance) -> int:
-    """What it missed of its sensors' frames, by their counters, and what found no room."""
+    """Frames that an instance missed, by their counters, and packets that it or the kernel dropped."""
     status = instance.status()
     dropped = sum(status["input"]["dropped"].values()) + status["input"]["kernel_drops"]
     return sum(sensor.get("lost", 0) for sensor in status["sensors"].values()) + dropped
 
 
 def trial(model: object, instances: int, sensors: int, rate: float, seconds: float) -> dict[str, Any]:
-    """The whole of it; times in seconds."""
+    """Run the instances, kill one and wait until its sensors are back; returns the figures, times in seconds."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, DESCRIPTORS), hard), hard))
     with tempfile.TemporaryDirectory(prefix="fleet-") as name:

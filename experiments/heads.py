@@ -1,4 +1,4 @@
-"""Heads that are learned again on what a trained network sees, without some classes of non-gestures."""
+"""Heads that are trained anew on the states of a trained network, without some classes of non-gestures."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from gestured.simulator import GESTURES
 
 
 class Cues(NamedTuple):
-    """What the heads see of samples."""
+    """The inputs of the heads for some samples."""
 
     embedded: Tensor  # (N, 32)
     features: Tensor  # (N, F) of the trajectory
@@ -28,7 +28,7 @@ class Cues(NamedTuple):
 
     @classmethod
     def made(cls, net: Recurrent, samples: Samples, plan: TrainingPlan, *, vary: bool = False) -> "Cues":
-        """Of all that have a class; with `vary` of a random part, as they are and varied."""
+        """The cues of all samples that have a class; with `vary` those of a random part, as they are and varied."""
         labels = targets(samples)
         index = np.flatnonzero(labels >= 0)
         if vary:
@@ -50,7 +50,7 @@ class Cues(NamedTuple):
 
 
 class Heads(NamedTuple):
-    """A trained network below its heads, which can be learned again without some classes."""
+    """The inputs of a trained network's heads, which can be trained anew without some classes."""
 
     teach: Cues
     calibrate: Cues
@@ -58,16 +58,17 @@ class Heads(NamedTuple):
 
     @classmethod
     def of(cls, trained: Trained, data: TrainingData, plan: TrainingPlan, name: str) -> "Heads":
-        """Of one of the recurrent networks and its second opinion."""
+        """The heads' inputs for one of the recurrent networks and its second opinion."""
         net = trained.nets[name]
         assert isinstance(net, Recurrent)
         tests = {test: (Cues.made(net, samples, plan), samples) for test, samples in data.tests.items()}
         return cls(Cues.made(net, data.teach, plan, vary=True), Cues.made(net, data.calibrate, plan), tests)
 
     def without(self, classes: Sequence[int], plan: TrainingPlan) -> Iterator[tuple[str, Answers, Samples, float]]:
-        """What new heads and a new calibration, neither of which has seen these classes, answer on each test set.
+        """Answers on each test set of new heads and a new calibration, which have not seen these classes.
 
-        A test set's name, answers, the samples that they are given to, and the confidence they are published from.
+        Yields the test set's name, the answers, the samples that they belong to, and the confidence from which answers
+        are published.
         """
         first, second = (_refit(self.teach, which, classes, plan) for which in (0, 1))
         seen = ~np.isin(self.calibrate.labels, classes)

@@ -1,4 +1,4 @@
-"""What enrolment is worth for simulated people and kinds of gesture from which nothing was learned.
+"""How well enrolment works for simulated people and kinds of gesture from which nothing was learned.
 
 python -m experiments.own models/cnn_lstm.onnx
 """
@@ -23,17 +23,17 @@ JUDGES = 12  # people
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What enrolment is worth after so many examples; shares."""
+    """How well enrolment works after a number of examples; shares."""
 
     examples: int
-    enrolled: float  # of the gestures: the others are refused as too near to one of the model's
+    enrolled: float  # gestures that can be enrolled; the others are too near to one of the model's
     recall: float  # further repetitions that are recognised
-    accepted: float  # other non-gestures that are taken for it
-    taken: float  # the model's gestures that are taken for it
+    accepted: float  # other non-gestures that are taken for the enrolled one
+    taken: float  # the model's gestures that are taken for the enrolled one
 
 
 def figures(space: Space, trials: Iterator[Trial]) -> list[Figures]:
-    """For each number of examples, with the thresholds and the margin of a space."""
+    """The figures for each number of examples, by the thresholds and the margin of a space."""
     every = list(trials)
     found = []
     for count in range(1, EXAMPLES + 1):
@@ -48,7 +48,7 @@ def figures(space: Space, trials: Iterator[Trial]) -> list[Figures]:
 
 
 def table(name: str, found: list[Figures]) -> Table:
-    """The figures for a person."""
+    """The figures as a table."""
     rows = [
         (one.examples, f"{one.enrolled:.3f}", f"{one.recall:.3f}", f"{one.accepted:.4f}", f"{one.taken:.4f}")
         for one in found

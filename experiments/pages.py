@@ -1,4 +1,4 @@
-"""What an experiment found: printed, and written into a page with the command, the models and the code that made it."""
+"""The result of an experiment: printed, and written into a page with the command, models and code that made it."""
 
 import argparse
 import sys
@@ -10,7 +10,7 @@ from gestured.lab.table import Table
 
 
 def add_document(parser: argparse.ArgumentParser, block: str) -> None:
-    """The option `--document`."""
+    """Add the option `--document`."""
     parser.add_argument("--document", type=Path, metavar="PAGE", help=f"a page whose block `{block}` is written anew")
 
 
@@ -23,9 +23,9 @@ def command() -> str:
 def tell(
     found: Table | str, files: Iterable[Path], block: str, document: Path | None, code: Sequence[str] = DECIDES
 ) -> None:
-    """Print it; and where there is a document, put it between the marks of a block of that name.
+    """Print a result and, if there is a document, write it into the document's block of that name.
 
-    `files` and `code`: the models, and the modules of gestured, that decide what it says.
+    `files` and `code` are the models and the modules of gestured on which the result depends.
     """
     print(found)
     if document:

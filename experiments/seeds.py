@@ -1,11 +1,12 @@
-"""What another seed would have made of the shipped network: its first stage, learned again; nothing ships from it.
+"""How far the shipped network depends on its seed: its first stage, trained with other seeds; nothing ships from it.
 
     python -m experiments.seeds --document models/cnn_lstm.md
 
-A further seed takes some 20 minutes of one core, and goes on where it was interrupted. The first seed is the one that
-ships: its network is taken from the cache of its training, in which two other networks were learned beside it. A
-further seed's network is learned alone. All are judged before calibration, second opinion and real fingers: a gesture
-is right where its score is the best among gestures; a non-gesture is rejected where the best of all scores is of none.
+A further seed takes some 20 minutes of one core, and can be interrupted and continued. The first seed is that of the
+model that ships: its network is taken from the cache of its training, in which two other networks were learned beside
+it. A further seed's network is learned alone. All are judged before calibration, second opinion and real fingers: a
+gesture is right if its score is the best among gestures; a non-gesture is rejected if the best of all scores is a
+non-gesture's.
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ SEEDS = (1, 2, 3)  # the first is the seed of the models that ship
 
 
 def shares(nets: nn.ModuleDict, data: TrainingData) -> list[float]:
-    """Of each test set the share of its gestures named rightly, and of its non-gestures rejected."""
+    """For each test set, the share of its gestures named rightly, and of its non-gestures rejected."""
     found: list[float] = []
     for test, samples in data.tests.items():
         scores, labels = logits(nets, samples)[NAME].numpy(), targets(samples)
@@ -61,7 +62,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="(default: 1 2 3)")
     add_document(parser, "seeds")
     args = parser.parse_args()
-    # The first stage learns from no day of the verifier or of the operating points, and from nothing real.
+    # The first stage uses no days of the verifier or of the operating points, and nothing real.
     plan, data = loaded(args, days_calibrate=1, chance_calibrate=1, days_points=1)
     data = replace(data, real=None)
     found = []

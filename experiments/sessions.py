@@ -2,8 +2,9 @@
 
     python -m experiments.sessions --real FOLDER --document docs/figures.md
 
-Frames pass through the daemon's own path, from the first one on. What counts is what is published at `normal`. Touches
-that the recordings do not name (`other`) are neither right nor false, nor is anything within half a second of one.
+Frames pass through the daemon's own path, from the first one on. Answers that are published at `normal` count. Touches
+that the recordings do not name (`other`) are neither right nor false, and neither is anything within half a second of
+one.
 """
 
 from pathlib import Path
@@ -49,7 +50,7 @@ def without(part: Trained, data: TrainingData, plan: TrainingPlan, path: Path) -
 
 
 def row(name: str, heard: list[Heard]) -> tuple[Value, ...]:
-    """One line: of a subject, or of all."""
+    """A row of the table, for one subject or for all."""
     of: Hours = judged(heard, NET, 0.0)
     found = of.figures()
     shares = (found["right"], found["wrong"], found["missed"])

@@ -1,10 +1,10 @@
-"""A long time with a real daemon: does it grow, or slow down? `python -m experiments.soak [--compressed]`.
+"""Whether a real daemon grows or slows down over a long time: `python -m experiments.soak [--compressed]`.
 
-Without a flag: ten minutes in real time, 20 sensors at 15 Hz. `--compressed`: 24 hours of one sensor by its own
-clock, as fast as it goes. Simulated people touch the sensors all the time; between two readings a client comes and
-goes, metrics are scraped, and the daemon reloads. Latency is from the arrival of the frame that decided to the
-event's arrival at a client (compressed: the daemon's CPU time a frame, since the time that a frame waits in the
-queue is ours). "Waiting" is the time in which the daemon could have run and others had the processor. "Slope" is the
+Without a flag: ten minutes in real time, 20 sensors at 15 Hz. `--compressed`: 24 hours of one sensor by its own clock,
+as fast as possible. Simulated people touch the sensors all the time; between two readings a client connects and leaves,
+metrics are scraped, and the daemon reloads. Latency is from the arrival of the frame that decided to the event's
+arrival at a client (compressed: the daemon's CPU time a frame, since this program fills the queue in which frames
+wait). "Waiting" is the time in which the daemon could have run while others had the processor. "Slope" is the
 least-squares line through the readings after the first fifth of the time.
 """
 
@@ -29,7 +29,7 @@ from tests.daemon.harness import Daemon, Sensor
 from tests.hostile.grammar import TYPES, violations
 
 TAKE_S = 600.0
-CHUNK = 2000  # frames on their way at once: fewer than the socket's buffer holds
+CHUNK = 2000  # frames sent and not yet taken: fewer than the socket's buffer holds
 READINGS = 30
 
 
@@ -42,7 +42,7 @@ class Reading:
     descriptors: int
     threads: int
     cpu_s: float
-    waited_s: float  # for a processor that others had
+    waited_s: float  # for the processor, while others had it
     frames: int
     latencies_ms: list[float] = field(default_factory=list)  # of the events since the reading before
 
@@ -67,7 +67,7 @@ class Watch:
                 self._latencies.append(1000 * (now - line["decided"]))
 
     def read(self, hours: float) -> None:
-        """Take a reading, with a client that comes and goes, and a reload before the next."""
+        """Take a reading while another client is connected, then let the daemon reload."""
         proc = Path(f"/proc/{self.daemon.process.pid}")
         visitor = self.daemon.client()
         frames = self.daemon.frames()
@@ -90,12 +90,12 @@ class Watch:
         self.daemon.signal(signal.SIGHUP)
 
     def end(self) -> None:
-        """The daemon has ended: take the rest."""
+        """Wait for the last events of a daemon that has ended."""
         self._thread.join(20)
 
 
 def compressed(watch: Watch, hours: float) -> None:
-    """One sensor by its own clock, as fast as it goes."""
+    """One sensor by its own clock, as fast as the daemon takes its frames."""
     sensor, form = Sensor(watch.daemon, "s0"), Form("s0")
     takes = [take(FIRST + n, TAKE_S) for n in range(4)]
     start, count, taken = 1.7e9, 0, 0
@@ -129,7 +129,7 @@ def real_time(watch: Watch, hours: float, sensors: int) -> None:
 
 
 def report(watch: Watch, is_compressed: bool) -> int:
-    """Print what the readings say; 1 where something grew or broke."""
+    """Print and judge the readings; returns 1 if descriptors or threads grew, or if an onset has no end."""
     readings = watch.readings
     print("hours  MiB     fds  threads  frames     us CPU/frame  us waiting/frame  p50 ms  p99 ms")
     for before, now in zip(readings, readings[1:], strict=False):
@@ -164,7 +164,7 @@ def report(watch: Watch, is_compressed: bool) -> int:
 
 
 def main() -> int:
-    """Run, and print readings and what they say."""
+    """Run a daemon and report on it; returns 1 if it failed, logged an error, grew or left an onset open."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--compressed", action="store_true", help="one sensor, as fast as it goes")
     parser.add_argument("--hours", type=float, help="of the sensor's time (default: 24 compressed, else 1/6)")

@@ -1,8 +1,8 @@
 """What a stall of the daemon costs: `python -m experiments.stall --sensors 100 --rate 15 --stall 3`.
 
-Made-up hands swipe and tap on many sensors, in real time, without frame counters. The daemon's process is stopped for
-a while, and goes on. Every gesture should be recognised as if nothing had happened, as far as the kernel's buffer
-holds the packets; and where it does not, none may be made up.
+Simulated hands swipe and tap on many sensors, in real time, without frame counters. The daemon's process is stopped for
+a while, and continued. As long as the kernel's buffer holds the packets, every gesture should be recognised as if
+nothing had happened; if it overflows, gestures may be missed, but none may be made up.
 """
 
 import argparse
@@ -34,8 +34,8 @@ class Result:
     verdicts: Counter[str] = field(default_factory=Counter)
     unknown: int = 0
     kernel_drops: int = 0
-    held_back: int = 0  # packets that were taken for a flood
-    late_s: float = 0.0  # how late the sensors were at most: no fault of the daemon's
+    held_back: int = 0  # packets dropped as a flood
+    late_s: float = 0.0  # the most by which sensors sent late, which is not the daemon's fault
     violations: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
@@ -49,7 +49,7 @@ class Script:
 
     def __init__(self, number: int, seconds: float) -> None:
         self._hand = Hand(number)
-        self._first = QUIET_S + PERIOD_S * (number * 0.381 % 1.0)  # so that not all are in the same phase
+        self._first = QUIET_S + PERIOD_S * (number * 0.381 % 1.0)  # so that the hands are out of phase
         self.gestures = [
             (start, start + (TAP_S if kind == "one_tap" else SWIPE_S), kind)
             for n in range(int((seconds - self._first - PERIOD_S) / PERIOD_S))
@@ -57,7 +57,7 @@ class Script:
         ]
 
     def frame(self, t: float) -> Frame:
-        """What the sensor shows."""
+        """The frame that the sensor shows at `t` s."""
         n = int((t - self._first) / PERIOD_S)
         if t >= self._first and n < len(self.gestures):
             start, end, kind = self.gestures[n]
@@ -70,9 +70,9 @@ class Script:
 def play(  # noqa: PLR0913 - each is a quantity of its own
     daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: float, rubbish: int = 0
 ) -> Result:
-    """Play `seconds` on so many sensors; the daemon stands still for `stall_s` in the middle of it.
+    """Play `seconds` on so many `sensors`; the daemon is stopped for `stall_s` in the middle.
 
-    While it does, some other program sends it so many packets of `rubbish`.
+    Meanwhile another program sends it so many packets of `rubbish`.
     """
     client = daemon.client().subscribe(*TYPES, "status")
     scripts = [Script(n, seconds) for n in range(sensors)]
@@ -116,12 +116,12 @@ def play(  # noqa: PLR0913 - each is a quantity of its own
 
 
 def listen(client: Client) -> list[dict[str, Any]]:
-    """What is still to come, until the daemon has heard nothing of any sensor for a while."""
+    """The lines still to come, until all sensors are stale."""
     return client.until(lambda line: line["type"] == "status" and all(s == "stale" for s in line["sensors"].values()))
 
 
 def main() -> int:
-    """Print what became of the gestures; 1 where one was wrong, made up, or missed without need."""
+    """Print what became of the gestures; returns 1 if one was wrong, made up, or missed without a lost packet."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
     parser.add_argument("--sensors", type=int, default=40)

@@ -1,4 +1,4 @@
-"""What it costs and what it saves to wait for a second tap: simulated taps, read with one wait after the other.
+"""What waiting for a second tap costs and saves: simulated taps, answered with one wait after the other.
 
 python -m experiments.taps --people 20
 """
@@ -24,7 +24,7 @@ from gestured.simulator import Participant, SimulatedSensor, Take, generator, se
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
 SESSION_S = 120.0  # of one participant; long enough for some dozens of taps
-TAPS = 100  # single and double ones in turn that a session has no time for
+TAPS = 100  # pairs of a single and a double tap: more than fit into a session
 
 
 def takes(people: int, seed: int) -> list[Take]:
@@ -37,7 +37,7 @@ def takes(people: int, seed: int) -> list[Take]:
 
 
 def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], list[float]]:
-    """What was done and what it was taken for, with counts; how long right single taps waited for their answer, s."""
+    """Counts of what was performed and what was recognised, and how long right single taps waited for answers (s)."""
     rows, columns = take.frames.shape[1:]
     scene = Scene(gestures=model.gestures, grid=(rows, columns), tap_gap_s=wait_s)
     sensor = Sensor("pad", scene, model)
@@ -57,7 +57,7 @@ def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], li
 
 
 def figures(model: str, people: int, seed: int) -> list[tuple[Value, ...]]:
-    """A row for each wait: shares of what was done, and the median single tap's wait."""
+    """A row for each wait: shares of the taps performed, and the median wait of a single tap."""
     sessions, opened = takes(people, seed), open_model(model)
     rows: list[tuple[Value, ...]] = []
     for wait_s in progress(WAITS_S, len(WAITS_S), "waits"):

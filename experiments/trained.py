@@ -1,4 +1,4 @@
-"""What programs about trained networks begin with: data and networks of `gestured-lab train`, from its cache."""
+"""Data and networks of `gestured-lab train`, from its cache, for experiments with trained networks."""
 
 import argparse
 from dataclasses import replace
@@ -11,7 +11,7 @@ from gestured.lab.train import Trained, TrainingData, TrainingPlan, learn, load_
 
 
 def options(text: str | None) -> argparse.ArgumentParser:
-    """The options that say which training it was."""
+    """A parser with the options that say which training is meant."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--models", type=Path, default=MODELS, help="folder of the models (%(default)s)")
     parser.add_argument("--cache", type=Path, default=CACHE, help="where finished steps are kept (%(default)s)")
@@ -23,7 +23,7 @@ def options(text: str | None) -> argparse.ArgumentParser:
 
 
 def loaded(args: argparse.Namespace, **less: int) -> tuple[TrainingPlan, TrainingData]:
-    """The plan and its data. `less` has other numbers for what a program does not read, such as `days_points=1`."""
+    """The plan and its data; `less` overrides numbers that a program does not need, such as `days_points=1`."""
     torch.set_num_threads(args.jobs)
     plan = replace(TrainingPlan.quick() if args.quick else TrainingPlan(), **less)
     args.cache.mkdir(parents=True, exist_ok=True)

@@ -1,10 +1,10 @@
-"""Non-gestures of kinds that nobody taught: how many are rejected where heads alone, or whole networks, lack them.
+"""Non-gestures of kinds that were not learned: how many are rejected if heads alone, or whole networks, lack them.
 
     python -m experiments.unseen --real FOLDER --document docs/figures.md
     python -m experiments.unseen --whole --real FOLDER --document docs/figures.md
 
-With --whole a network and its second opinion are trained without a group of kinds, which goes on where it was
-interrupted. With --document its table and that of the network's card are written anew.
+With --whole a network and its second opinion are trained without a group of kinds; an interrupted training can be
+continued. With --document the tables of that page and of the network's card are written anew.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,8 +32,8 @@ from gestured.model.opening import open_model
 from gestured.simulator import GESTURES
 
 NAME = "cnn_lstm"  # the network that is judged
-# Kinds of non-gestures that are held out in turn. A new kind joins the end of one of them, so that figures which were
-# published go on to mean what they meant.
+# Kinds of non-gestures that are held out in turn. A new kind is added at the end of a group, so that published figures
+# keep their meaning.
 GROUPS = (
     ("arc", "corner", "electrical_burst", "heel_rest", "object_put_down", "press_and_slide", "scribble", "spike",
      "taps_apart", "two_finger_swipe_right", "wipe"),
@@ -51,9 +51,9 @@ def group_of(number: int) -> list[int]:
 
 
 def untaught(classes: Sequence[int]) -> list[int]:
-    """Those of some classes that no other class is turned or mirrored into while networks learn.
+    """The classes among `classes` into which training turns or mirrors no other class.
 
-    A swipe of two fingers to the right is one upward turned: a network that learns the one has seen the other.
+    A swipe of two fingers to the right is an upward one, turned: a network that learns one of them has seen the other.
     """
     left = set(classes)
     table = symmetry_table(CLASSES).numpy()
@@ -63,7 +63,7 @@ def untaught(classes: Sequence[int]) -> list[int]:
 
 
 def without_kinds(data: TrainingData, classes: Sequence[int]) -> TrainingData:
-    """The same data with no sample of these classes left in what teaches and calibrates; what judges keeps them."""
+    """The data without these classes in what teaches and calibrates; what judges keeps them."""
 
     def kept(samples: Samples) -> NDArray[np.bool_]:
         return ~np.isin(targets(samples), classes)
@@ -82,7 +82,7 @@ def without_kinds(data: TrainingData, classes: Sequence[int]) -> TrainingData:
 
 
 class Said(NamedTuple):
-    """What is answered on a test set, where some classes of non-gestures are asked after."""
+    """Answers on a test set, and the classes of non-gestures that are judged."""
 
     test: str
     answers: Answers
@@ -91,7 +91,7 @@ class Said(NamedTuple):
     classes: Sequence[int]
 
     def judged(self, performed: int) -> Evaluation:
-        """Of all gestures, and of these non-gestures alone."""
+        """Judge the answers to all gestures, and to these non-gestures alone."""
         labels = targets(self.samples)
         chosen = ((labels >= 0) & (labels < len(GESTURES))) | np.isin(labels, self.classes)
         scores, unknown = self.answers
@@ -100,7 +100,7 @@ class Said(NamedTuple):
 
 
 def rejected(found: Sequence[Said]) -> dict[str, Any]:
-    """Which share of those non-gestures was rejected, with its 95 % interval over people, and of each kind."""
+    """The share of those non-gestures that was rejected, with its 95 % interval over people, and that of each kind."""
     labels, people, hit = [], [], []
     for said in found:
         known = targets(said.samples)
@@ -115,17 +115,17 @@ def rejected(found: Sequence[Said]) -> dict[str, Any]:
 
 
 def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
-    """Non-gestures of kinds that the heads and the calibration have not seen: three groups of kinds, in turn."""
+    """How non-gestures of kinds that heads and calibration have not seen are rejected: three groups in turn."""
     heads = Heads.of(trained, data, plan, NAME)
     groups = [group_of(number) for number in range(len(GROUPS))]
     return rejected([Said(*given, classes) for classes in groups for given in heads.without(classes, plan)])
 
 
 def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, path: Path) -> dict[str, Any]:
-    """Non-gestures of one group of kinds that a network, its second opinion and its calibration have not seen at all.
+    """How non-gestures are rejected of which a network, its second opinion and its calibration have seen none.
 
-    Beside it the same kinds where heads and calibration alone lack them, and the model in `path`, which knows them;
-    with what each makes of the gestures. The training is kept in `cache`, as every other.
+    Beside it are the figures of heads and calibration alone without these kinds, and of the model in `path`, which
+    knows them, each with its shares of the gestures. The training is kept in `cache`, as every other.
     """
     classes = untaught(group_of(WHOLE))
     print(f"{NAME} and {len(classes)} kinds of non-gestures: {', '.join(CLASSES[k] for k in classes)}", flush=True)
@@ -144,7 +144,7 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
 
 
 def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: Sequence[int]) -> list[Said]:
-    """What a network that was trained and calibrated on these data answers on the test sets."""
+    """The answers on the test sets of a network that was trained and calibrated on these data."""
     module, calibration, _ = judged(trained, NAME, calibration_set(trained, data))
     least = calibration["threshold"]
     return [
@@ -186,7 +186,7 @@ def lines_of(heads: Mapping[str, Any], whole: Mapping[str, Any] | None) -> list[
 
 
 def main() -> None:
-    """The command line."""
+    """Print the lines and, with --document, write them."""
     parser = options(__doc__)
     parser.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds")
     parser.add_argument("--document", type=Path, help="one whose table is written anew, and the card's")

@@ -1,10 +1,10 @@
-"""How accurately a contact's place is told, against the true places of two generators, and on real frames.
+"""How accurate a contact's place is, against the true places of two generators, and on real frames.
 
     python -m experiments.where --real FOLDER --document docs/where.md
 
-Each take is another person on another sensor; its frames pass through the front end as in the daemon. Errors are in
-taxel pitches. Real frames (CapFingerId, 27 x 15) have no truth: there the place in a frame is compared with that in the
-same frame averaged to 9 x 9.
+Each take is of another person on another sensor; its frames pass through the front end as in the daemon. Errors are in
+taxel pitches. The true places of real frames (CapFingerId, 27 x 15) are not known: the place in a frame is compared
+with that in the same frame averaged to 9 x 9.
 """
 
 import argparse
@@ -43,9 +43,9 @@ PAD_MM = 72.0  # shorter side of a good simulated sensor, whatever its grid
 DOWN, FIRM = (
     0.15,
     0.3,
-)  # of a usual press: from there on a finger is on the sensor, and presses so that a frame shows it
+)  # of a usual press: from there on a finger is on the sensor, and a frame is sure to show it
 APART = (1.5, 2.0, 2.5, 3.0, 4.0, math.inf)  # pitches between two fingers: edges of the table's rows
-TELLS = ("gestured.core.front_end", "gestured.core.where")  # the code that decides what is said of a place
+TELLS = ("gestured.core.front_end", "gestured.core.where")  # the modules that decide a place
 TOUCHED = 60  # counts of a real frame that shows a finger
 
 
@@ -59,7 +59,7 @@ class Finger:
     force: Array
 
     def at(self, t: float) -> tuple[float, float] | None:
-        """Row and column at `t` s; None where it did not press firmly."""
+        """Row and column at `t` s; None if the finger did not press firmly."""
         if not self.t[0] <= t <= self.t[-1] or np.interp(t, self.t, self.force) < FIRM:
             return None
         return float(np.interp(t, self.t, self.row)), float(np.interp(t, self.t, self.column))
@@ -71,7 +71,7 @@ class Take:
 
     frames: NDArray[np.generic]
     times: Array
-    behind_s: float  # how far a frame's time is behind the middle of the time that it shows
+    behind_s: float  # s from the middle of the time that a frame shows to the frame's time
     fingers: list[Finger]
 
 
@@ -113,7 +113,7 @@ def foreign(kind: str, good: bool, grid: Grid, seed: int) -> Take:
 
 
 def segments(take: Take) -> list[Segment]:
-    """What the front end cuts out of a take."""
+    """The segments that the front end cuts out of a take."""
     front_end = FrontEnd(*take.frames.shape[1:])
     found = [
         one
@@ -127,7 +127,7 @@ def segments(take: Take) -> list[Segment]:
 def taken(
     make: Callable[..., Take], kinds: tuple[str, ...], good: bool, grid: Grid, count: int
 ) -> Iterator[tuple[Take, Segment]]:
-    """So many takes, each with its segment; those with several segments, or none, are another matter."""
+    """Those of `count` takes that have exactly one segment, each with its segment."""
     for k in range(count):
         take = make(kinds[k % len(kinds)], good, grid, FIRST + k)
         cut = segments(take)
@@ -136,7 +136,7 @@ def taken(
 
 
 def off(found: Where, segment: Segment, take: Take) -> tuple[float, float]:
-    """By how much the start and the end of a contact of one finger are told wrongly."""
+    """Errors, in pitches, of the start and the end of a contact of one finger."""
     (finger,) = take.fingers
     rows, columns = segment.frames.shape[1:]
     first, last = np.flatnonzero(finger.force >= DOWN)[[0, -1]]
@@ -147,7 +147,7 @@ def off(found: Where, segment: Segment, take: Take) -> tuple[float, float]:
 
 
 def places(take: Take, segment: Segment) -> Iterator[tuple[list[tuple[float, float]], list[tuple[float, float]]]]:
-    """Of each touched frame where the fingers truly were, and where they are found."""
+    """For each touched frame in which all fingers press firmly, their true places and the places found."""
     for k in range(segment.first, segment.last + 1):
         true = [at for finger in take.fingers if (at := finger.at(float(segment.times[k]) - take.behind_s))]
         found = spots(segment.frames[k].astype(np.float64).ravel(), segment.frames.shape[1:], segment.noise)
@@ -212,7 +212,7 @@ def several(count: int) -> Table:
 
 
 def real(folder: Path, count: int) -> Table:
-    """Real frames against themselves on a coarser grid."""
+    """Places in real frames, against places in the same frames on a coarser grid."""
     frames = read(folder / REAL_FILES[1]).frames
     rng = np.random.default_rng(0)
     touched = np.flatnonzero(frames.max(axis=(1, 2)) >= TOUCHED)
@@ -257,7 +257,7 @@ def main() -> None:
     parser.add_argument("--real", type=Path, required=True, metavar="FOLDER", help="of real recordings, CapFingerId's")
     add_document(parser, "places")
     args = parser.parse_args()
-    found = real(args.real, 10 * args.takes)  # first, so that missing recordings are told of now
+    found = real(args.real, 10 * args.takes)  # first, so that missing recordings are reported at once
     tables = (accuracy(args.takes), several(args.takes), found)
     tell("\n".join(map(str, tables)), [], "places", args.document, TELLS)
 

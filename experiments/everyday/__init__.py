@@ -1,1 +1,1 @@
-"""Hours of everyday life on a sensor, and what is said in them."""
+"""Hours of everyday life by the other generator, and a model's answers in them."""

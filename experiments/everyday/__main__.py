@@ -1,4 +1,4 @@
-"""What a model says in everyday contact by the other generator, judged as `gestured-lab everyday` judges its own.
+"""What a model answers in everyday contact by the other generator, judged as `gestured-lab everyday` judges its own.
 
     python -m experiments.everyday --hours 10 --foreign nominal
     python -m experiments.everyday my.onnx --hours 10 --foreign hard --strictness strict
@@ -19,7 +19,7 @@ from gestured.lab.everyday.report import figures, tables
 
 
 def main() -> None:
-    """Print false gestures an hour, and what became of those that were meant."""
+    """Print false gestures an hour, and what became of gestures that were meant."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?", default="cnn_lstm", help="a shipped model, or a file (default: cnn_lstm)")
     parser.add_argument("--foreign", choices=LEVELS, default=LEVELS[0], help=f"sensors (default: {LEVELS[0]})")

@@ -1,4 +1,4 @@
-"""Half hours of the other generator, for the judge of `gestured-lab everyday`; other processes can load this module."""
+"""Half hours of the other generator for the judge of `gestured-lab everyday`, in a module that processes can import."""
 
 import experiments.foreign.life as foreign
 from gestured.core.frames import Frame
@@ -18,5 +18,5 @@ def lived(level: str, seed: int) -> Stretch:
 
 
 def heard(level: str, model: str, strictness: Strictness, seed: int) -> Heard:
-    """What a model says in it."""
+    """A model's answers in half an hour of the other generator."""
     return hear(lived(level, seed), at(model, strictness), strictness)

@@ -1,7 +1,7 @@
 """A second generator of tactile recordings, conceived apart from `gestured.simulator`, to judge models with.
 
-No model is ever trained or tuned on it: once that happens it says nothing any more. It is not reality either;
-it only errs in other ways than the simulator does.
+No model is ever trained or tuned on it, since it could then judge no longer. It is not reality either; it only errs in
+other ways than the simulator does.
 """
 
 from typing import Any
@@ -49,24 +49,23 @@ def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
 
     Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`,
     `onset` and `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in
-    each frame; below about 4 nobody can see a touch. `contacts` are the times (s) of
-    each finger's contact. Idle for at least 1.3 s before and after.
+    each frame; a touch below about 4 cannot be seen. `contacts` are the times (s) of each finger's contact. The
+    sheet is idle for at least 1.3 s before and after.
     """
     return _take(kind, seed, level, 9, 9, 15.0)
 
 
 def other_grids(kind: str, seed: int) -> list[dict[str, Any]]:
-    """The same as a nominal `take` on each sheet of `GRIDS`; with `rate_hz`."""
+    """A nominal `take` on each sheet of `GRIDS`, with its `rate_hz`."""
     return [{**_take(kind, seed, "nominal", *grid), "rate_hz": grid[2]} for grid in GRIDS]
 
 
 def session(
     seed: int, level: str = "nominal", seconds: float = 60.0, non_gesture_share: float = 0.25
 ) -> dict[str, Any]:
-    """One person at one sheet for a while, pauses of 0.7 to 3 s between what is done.
+    """One person at one sheet for a while, with pauses of 0.7 to 3 s between performances.
 
-    Returns `frames`, `times`, `seen` and `events`: dictionaries with `label`, `kind`, `onset`, `release`
-    (s).
+    Returns `frames`, `times`, `seen` and `events`: dictionaries with `label`, `kind`, `onset`, `release` (s).
     """
     rng = np.random.default_rng([seed, 1000, LEVELS.index(level)])
     person, sensor = draw_person(rng, level), draw_sensor(rng, level)

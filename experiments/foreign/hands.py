@@ -1,9 +1,8 @@
 """Hands of the independent generator: what fingers do, as pads of pressure points moving in continuous time.
 
-Nothing here is shared with, or was copied from, the simulator that the models are trained on. Paths are
-drawn as a person would draw them on paper: a few control points, shaken, joined by a spline and run along
-with a trapezoid speed. Coordinates are taxels of a 9 x 9 sheet: x to the right, y DOWN (a row number),
-0..8.
+Nothing here is shared with, or was copied from, the simulator that the models are trained on. Paths are drawn as a
+person would draw them on paper: a few control points, shaken, joined by a spline and followed at a speed with a
+trapezoid profile. Coordinates are taxels of a 9 x 9 sheet: x to the right, y down (a row number), 0 to 8.
 """
 
 from collections.abc import Callable, Sequence
@@ -61,7 +60,7 @@ class Pad:
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """What one person did: pads, or an electrical disturbance where `burst` is not empty."""
+    """What one person did: pads, or an electrical disturbance if `burst` is not empty."""
 
     kind: str
     pads: tuple[Pad, ...]
@@ -138,7 +137,7 @@ def ramp(u: Array) -> Array:
 
 
 def _force(rng: Rng, person: Person, t: Array, duration: float, attack: float, decay: float) -> Array:
-    """Up, a wavering plateau, down; 0 at both ends."""
+    """(K,) force of a press: a rise, a wavering plateau and a fall, 0 at both ends."""
     level = person.press * float(np.exp(rng.normal(0.0, 0.2 if person.light else 0.1)))
     level = max(level, 0.55 if person.light else 0.7)
     attack, decay = min(attack, duration * 0.45), min(decay, duration * 0.45)
@@ -232,7 +231,7 @@ def _two_fingers(rng: Rng, person: Person, kind: str, heading: float) -> Perform
     length = float(rng.uniform(3.0, 7.0) if person.light else rng.uniform(3.5, 7.0))
     path = spline(_line(rng, person, heading, 16.0, length))
     space = float(rng.uniform(1.5, 4.0))
-    # Side by side as two fingers of one hand are: nearly square to the way, one a little ahead.
+    # Two fingers of one hand move side by side, nearly at right angles to the way, one a little ahead.
     side = np.radians(heading + 90.0 + rng.normal(0.0, 12.0))
     # Fingers of one hand come a little nearer or spread a little on the way.
     grow = np.interp(np.arange(len(path)), [0, len(path) - 1], [1.0, rng.uniform(0.85, 1.15)])
@@ -429,7 +428,7 @@ _OTHERS: dict[str, Callable[[Rng, Person], Performance]] = {
 
 
 def perform(kind: str, rng: Rng, person: Person) -> Performance:
-    """One person does one thing. Raises KeyError for an unknown kind."""
+    """Let one person perform a gesture or non-gesture. Raises KeyError for an unknown kind."""
     if kind == "two_finger_sideways":
         return _two_fingers(rng, person, kind, HEADINGS[str(rng.choice(["left", "right"]))])
     if kind == "diagonal_swipe":

@@ -39,7 +39,7 @@ from gestured.model.shipped import shipped
 
 SEEN = 4.0  # times the noise
 SESSION_S = 120.0
-OPENED = Path("experiments/foreign/opened.txt")  # in a checkout: when it judged for a page, and which models
+OPENED = Path("experiments/foreign/opened.txt")  # kept in a checkout: when it judged for a page, and which models
 Take = dict[str, Any]
 HEAD = (
     "| model and sensors | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
@@ -60,7 +60,7 @@ class Outcome:
     level: str
     seed: int
     answer: str  # label | "unknown" | "missed" | "split" | "cancelled:REASON"
-    before: str = ""  # best label before rejection, where there is one segment
+    before: str = ""  # best label before rejection, if there is one segment
     late: float = 0.0  # s, decision after the true release
     ready: bool = True
 
@@ -182,14 +182,14 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
 
 
 def _ends(hits: Iterable[bool]) -> dict[str, float]:
-    """Where a share's 95 % interval begins and ends; each take is another person."""
+    """The ends of a share's 95 % interval; each take is of another person."""
     counted = list(hits)
     _, low, high = interval(counted, range(len(counted)))
     return {"low": low, "high": high}
 
 
 def row(model: str, level: str, found: dict[str, Any]) -> str:
-    """A line of the table; what is unknown, missed, cancelled or split is lost."""
+    """A line of the table; a gesture is lost if it is unknown, missed, cancelled or split."""
     lost = sum(found[name] for name in ("unknown", "missed", "cancelled", "split"))
     right, wrong, gone, rejected = (
         with_interval(share, found["ends"][name])
@@ -206,7 +206,7 @@ def row(model: str, level: str, found: dict[str, Any]) -> str:
 
 
 def left_out(results: dict[str, dict[str, Any]], args: argparse.Namespace) -> list[str]:
-    """How many gestures nobody could see, and what the shares were if each of them were lost."""
+    """A note: how many gestures nobody could see, and the shares of right ones if each of these were lost."""
     asked, first = args.n * len(set(args.kinds) & set(GESTURES)), next(iter(results.values()))
     dark = ", ".join(f"{asked - found['gestures']} on {level} sensors" for level, found in first.items())
     shares = {
@@ -222,7 +222,7 @@ def left_out(results: dict[str, dict[str, Any]], args: argparse.Namespace) -> li
 
 
 def show_shipped(args: argparse.Namespace) -> None:
-    """Print the table of all shipped models; put it where --document wants it."""
+    """Print the table of all shipped models; with --document also write it into that page and the models' cards."""
     results = {name: judged(name, args) for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
     above = [made_of(command(), shipped().values()), "", *HEAD]
@@ -266,7 +266,7 @@ def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
 
 
 def judged(source: str, args: argparse.Namespace) -> dict[str, Any]:
-    """What a model makes of the takes that are asked for."""
+    """The figures of a model on the takes that the options ask for."""
     levels = ["grids"] if args.grids else args.level
     tasks = [(source, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
     outcomes: list[Outcome] = []
@@ -290,7 +290,7 @@ def show_provisional(args: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    """The command line."""
+    """Print what the options ask for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
     parser.add_argument(

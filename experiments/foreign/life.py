@@ -1,9 +1,9 @@
 """Everyday life of the independent generator: half hours of ordinary contact, and gestures meant in between.
 
-One person at one place does things as they come to mind: each kind of contact has its rate, some come in bouts, one
-person does at the same rate what another hardly ever does. What lies there (an arm, a hand, a thing) breathes, wanders,
-is re-seated and shaken by the road until it leaves. Conceived without a look at the simulator's own everyday life.
-No model is trained or tuned on it, and a rate in RATES is never changed to make a figure better.
+One person at one place makes contacts at random: each kind has a rate, which differs between people, and some kinds
+come in bouts. What lies on the sheet (an arm, a hand, a thing) breathes, wanders, is re-seated and shaken by the road
+until it leaves. All this was conceived without looking at the simulator's own everyday life. No model is trained or
+tuned on it, and a rate in RATES is never changed to make a figure better.
 """
 
 import heapq
@@ -29,9 +29,9 @@ from experiments.foreign.sensors import draw_sensor, record
 from gestured.record.judge import NONE, Performed
 
 PLACES = ("armrest", "door", "seat", "robot", "table")
-HOW = ("quiet", "middle", "after", "beside")  # in what a gesture is meant, see `Life`
+HOW = ("quiet", "middle", "after", "beside")  # the circumstances of a meant gesture, see `Life`
 LENGTH_S = 1800.0
-RATES: dict[str, tuple[tuple[float, ...], float, str]] = {  # an hour at each of PLACES; how many come in a bout; source
+RATES: dict[str, tuple[tuple[float, ...], float, str]] = {  # an hour at each of PLACES; mean size of a bout; source
     "gesture": ((90, 90, 90, 90, 90), 1.0, "issue 22: about 90"),
     "rest": ((15, 17, 8, 9, 16), 1.0, "arm on the rest 34 % of the time, Viano et al. 1989, with STAYS below"),
     "shift": ((60, 50, 70, 30, 50), 1.0, "an hour of lying; about one a minute, assumed"),
@@ -56,7 +56,7 @@ RATES: dict[str, tuple[tuple[float, ...], float, str]] = {  # an hour at each of
 }
 WHILE_LYING = ("shift", "lift")
 STAYS = {"armrest": 55.0, "door": 48.0, "seat": 110.0, "robot": 8.0, "table": 45.0, "thing": 22.0}  # s, median; assumed
-POSTURES = {  # those at a door are SAE 2007-01-1217's, the shares assumed
+POSTURES = {  # those at a door are from SAE 2007-01-1217; the shares are assumed
     "armrest": {"forearm": 0.5, "elbow": 0.15, "wrist": 0.2, "hand": 0.15},
     "door": {"forearm": 0.4, "elbow": 0.45, "wrist": 0.1, "hand": 0.05},
     "seat": {"thigh": 0.8, "elbow": 0.05, "hand": 0.15},
@@ -64,8 +64,8 @@ POSTURES = {  # those at a door are SAE 2007-01-1217's, the shares assumed
     "table": {"forearm": 0.45, "elbow": 0.15, "wrist": 0.25, "hand": 0.15},
 }
 Span = tuple[float, float]
-# What touches once and is broad; all assumed. How many pieces, points of each, its sigma along (from, to) and across,
-# the pieces' distance, the way that it goes (taxels), force (fingers' usual presses), how long it lasts, and rises (s).
+# Broad contacts that touch once; all assumed. Number of pieces, points of each, sigma along (from, to) and across,
+# distance of the pieces, length of the way (all in taxels), force (a finger's usual presses), duration and rise (s).
 PATCHES: dict[str, tuple[tuple[int, int], int, Span, float, float, Span, Span, Span, float]] = {
     "graze": ((1, 4), 14, (0.3, 1.3), 0.3, 1.3, (1.0, 7.0), (0.2, 1.2), (0.07, 0.45), 0.05),
     "cloth": ((3, 7), 16, (0.8, 2.0), 0.3, 2.5, (0.3, 1.5), (0.1, 0.7), (1.0, 14.0), 0.3),
@@ -76,19 +76,19 @@ PATCHES: dict[str, tuple[tuple[int, int], int, Span, float, float, Span, Span, S
     "slide": ((1, 1), 30, (0.6, 2.0), 0.8, 0.0, (3.0, 14.0), (1.0, 5.0), (0.25, 1.6), 0.1),
     "wipe": ((1, 1), 30, (0.8, 1.8), 0.8, 0.0, (5.0, 11.0), (1.0, 4.0), (0.25, 0.6), 0.1),
 }
-HABIT = 0.5  # how much people differ in each rate, sigma of a lognormal of mean 1; assumed
+HABIT = 0.5  # sigma of the lognormal of mean 1 by which people differ in each rate; assumed
 DRIVING = {"armrest": 0.7, "door": 0.7, "seat": 0.7}  # share of the time; assumed
 ROUGH = np.array([16e-6, 64e-6, 256e-6])  # m^3, ISO 8608 classes A, B and C at 0.1 cycles a metre
-TAP_S, TAP_TRAVEL = 0.3, 0.15 * 9  # s, taxels: what is a tap in truth
+TAP_S, TAP_TRAVEL = 0.3, 0.15 * 9  # s and taxels: a contact of one finger is a tap up to this duration and travel
 
 
 @dataclass(frozen=True)
 class Life:
     """Half an hour of one person: frames (N, 9, 9) raw counts at times (N,) s, and the truth.
 
-    A gesture that was meant has as its kind what it was meant in: `beside` something that lies there; `after`: within a
-    second after something left; `middle`: within five; `quiet`: later than that. `taps` are those of the contacts that
-    nobody meant which are taps in truth: one finger, short, in one place, and nothing else touches.
+    The kind of a meant gesture is its circumstance: `beside` something that lies there; `after`: within a second after
+    something left; `middle`: within five; `quiet`: later than that. `taps` are contacts that nobody meant as gestures
+    and that are taps all the same: one finger, short, in one place, and nothing else touches.
     """
 
     place: str
@@ -101,7 +101,7 @@ class Life:
 
 @dataclass(eq=False)
 class _Part:
-    """A patch that lies there from `since` (s) on, until it is taken up."""
+    """A patch that lies on the sheet from `since` (s) until it is lifted."""
 
     kind: str
     since: float
@@ -111,12 +111,12 @@ class _Part:
 
 
 def _road(rng: Rng, share: float, length: float) -> tuple[Array, Array]:
-    """Times (s) and the up-and-down acceleration (m/s^2) of a car's body on roads of ISO 8608, standing in between."""
+    """Times (s) and vertical acceleration (m/s^2) of a car's body on roads of ISO 8608, with stops."""
     t = np.arange(0.0, length, 0.02)
     f = np.maximum(np.fft.rfftfreq(len(t), 0.02), 0.05)
-    r = f / rng.uniform(1.1, 1.6)  # the body's own frequency, Hz
+    r = f / rng.uniform(1.1, 1.6)  # the body's natural frequency, Hz
     body = (1 + (0.6 * r) ** 2) / ((1 - r**2) ** 2 + (0.6 * r) ** 2) / (1 + (f / 12) ** 4)
-    density = (2 * np.pi * f) ** 4 * 0.01 * rng.uniform(8.0, 33.0) / f**2 * body  # at so many m/s, of a road of 1 m^3
+    density = (2 * np.pi * f) ** 4 * 0.01 * rng.uniform(8.0, 33.0) / f**2 * body  # at 8 to 33 m/s, roughness 1 m^3
     shaken = np.fft.irfft(np.fft.rfft(rng.standard_normal(len(t))) * np.sqrt(density / 0.04), len(t))
     minutes = np.arange(0.0, length + 60.0, 60.0)
     moving = np.repeat(rng.random(len(minutes) // 4 + 1) < share, 4)[: len(minutes)]
@@ -129,13 +129,13 @@ def _road(rng: Rng, share: float, length: float) -> tuple[Array, Array]:
 
 
 class _Story:
-    """What happens in one half hour, thing by thing; what was done stands in `pads`, `touches` and `contacts`."""
+    """The course of one half hour; what was done is in `pads`, `touches`, `contacts` and `meant`."""
 
     def __init__(self, rng: Rng, place: str, level: str, length: float) -> None:
         self.rng, self.place, self.length = rng, place, length
         self.person, self.other = draw_person(rng, level), draw_person(rng, level)
         self.road = _road(rng, DRIVING.get(place, 0.0), length + 60)
-        self.breath = 2 * np.pi * rng.uniform(0.2, 0.33)  # a second, as adults at rest breathe
+        self.breath = 2 * np.pi * rng.uniform(0.2, 0.33)  # rad/s, as adults breathe at rest
         self.habits = {kind: float(np.exp(rng.normal(0, HABIT) - HABIT**2 / 2)) for kind in RATES} | {"gesture": 1.0}
         self.pads: list[Pad] = []
         self.touches: list[tuple[float, float, bool]] = []  # of each pad: onset and offset (s), whether it may be a tap
@@ -144,13 +144,13 @@ class _Story:
         self.lying: list[_Part] = []
         self.agenda: list[tuple[float, str]] = []
         self.last = -9.0  # s, when something was last lifted
-        self.pending = False  # a gesture is meant after the next contact
+        self.pending = False  # a gesture follows the next contact
         for kind in RATES:
             if kind not in WHILE_LYING:
                 self._plan(kind, 2.0, length)
 
     def live(self) -> None:
-        """Do everything; what lies at the end stays."""
+        """Work off the agenda; what lies on the sheet at the end stays."""
         clock = 2.0
         while self.agenda:
             at, kind = heapq.heappop(self.agenda)
@@ -167,7 +167,7 @@ class _Story:
         self._leave(self.length + 5.0, self.lying)
 
     def _plan(self, kind: str, start: float, end: float) -> None:
-        """Put what this person does of a kind between two times (s) on the agenda; bouts come together."""
+        """Put this person's contacts of a kind between two times (s) on the agenda, bout by bout."""
         rates, bout, _ = RATES[kind]
         rate = rates[PLACES.index(self.place)] * self.habits[kind] / bout
         for t in self.rng.uniform(start, end, self.rng.poisson(rate * (end - start) / 3600)):
@@ -175,7 +175,7 @@ class _Story:
                 heapq.heappush(self.agenda, (float(t) + 2.0 * n, kind))
 
     def _do(self, kind: str, now: float, hand: Person) -> float:
-        """Do one thing from `now` on; when it is over (s)."""
+        """Do one thing from `now` on; returns when it is over (s)."""
         if kind in ("leave", "take"):
             return self._leave(now, [part for part in self.lying if (kind == "take") == (part.kind == "thing")])
         before = len(self.touches)
@@ -199,7 +199,7 @@ class _Story:
         self.contacts.append(Performed(NONE, kind, onset, offset))
 
     def _add(self, pad: Pad, start: float, *, finger: bool = False, loose: float = 0.6) -> float:
-        """Let a pad touch from `start` on, shaken by the road as far as it is loose; when it lifts (s)."""
+        """Let a pad touch from `start` on, shaken by the road as far as it is loose; returns when it lifts (s)."""
         t = pad.t + start
         g = loose * np.interp(t, *self.road) / 9.81
         force = pad.force * np.clip(1 + g, 0.0, 4.0)
@@ -210,7 +210,7 @@ class _Story:
         return float(t[-1])
 
     def taps(self) -> list[Performed]:
-        """Which touches of those that nobody meant are taps in truth."""
+        """The contacts that nobody meant as gestures, and that are taps all the same."""
         onsets, offsets = (np.array([touch[n] for touch in self.touches]) for n in (0, 1))
         return [
             Performed(NONE, "tap", on, off)
@@ -218,19 +218,19 @@ class _Story:
             if small and ((onsets <= off) & (offsets >= on)).sum() == 1
         ]
 
-    # What shapes and ways are made of.
+    # Shapes and paths.
 
     def _gap(self, soon: float) -> float:
-        """How long after the last contact a gesture follows (s), within a second or later."""
+        """Seconds from the last contact to a gesture: below 1 with a probability of `soon`, else 1 to 5."""
         return float(self.rng.uniform(0.15, 1.0) if self.rng.random() < soon else self.rng.uniform(1.0, 5.0))
 
     def _cloud(self, count: int, along: float, across: float, angle: float) -> Array:
-        """(count, 2) points of something soft: so wide (taxels, sigma) along an angle (rad) and across it."""
+        """(count, 2) random points, normal with these sigmas (taxels) along an angle (rad) and across it."""
         u, v = self.rng.normal(0, along, count), self.rng.normal(0, across, count)
         return np.stack([u * np.cos(angle) - v * np.sin(angle), u * np.sin(angle) + v * np.cos(angle)], axis=1)
 
     def _way(self, length: float, legs: int = 1) -> Array:
-        """A nearly straight way (N, 2) through a spot, to and fro."""
+        """A nearly straight path (N, 2) through a random spot, to and fro for so many `legs`."""
         a, spot = self.rng.uniform(0, 2 * np.pi), self.rng.uniform(-0.4, 8.4, 2)
         step = 0.5 * length * np.array([np.cos(a), np.sin(a)])
         way = np.stack([spot - step, spot + self.rng.normal(0, 0.06 * length, 2), spot + step])
@@ -238,7 +238,7 @@ class _Story:
         return np.concatenate([way[:: 1 - 2 * (n % 2)] + n * drift for n in range(legs)])
 
     def _patch(self, path: Array, points: Array, force: float, lasts: float, rise: float) -> Pad:
-        """Something that comes down, goes along a path (N, 2) at a wavering pace, and lifts."""
+        """A patch that comes down, goes along a path (N, 2) at a wavering pace, and lifts."""
         t = np.arange(0.0, lasts + STEP_S, STEP_S)
         pace = np.interp(t / t[-1], np.linspace(0, 1, 6), np.sort(np.r_[0, self.rng.random(4), 1]))
         u, k = (0.5 * pace + 0.5 * t / t[-1]) * (len(path) - 1), np.arange(len(path))
@@ -250,7 +250,7 @@ class _Story:
         return Pad(t, x, y, pressed, points, weights / weights.sum(), 0.4)
 
     def _patches(self, kind: str, now: float) -> float:
-        """Something broad that touches once, in one piece or several."""
+        """One contact of PATCHES, in one piece or several; returns when it is over (s)."""
         (least, most), count, wide, narrow, apart, length, force, lasts, rise = PATCHES[kind]
         draw, end, legs = self.rng.uniform, now, int(self.rng.integers(2, 9)) if kind == "wipe" else 1
         whole = legs * draw(*lasts)
@@ -262,10 +262,10 @@ class _Story:
             end = max(end, self._add(pad, now + min(n, 1) * draw(0, 0.1)))
         return end
 
-    # What lies.
+    # What lies on the sheet.
 
     def _leave(self, now: float, parts: list[_Part]) -> float:
-        """Parts that have lain are taken up, which makes pads of ten seconds each of them; when they are gone (s)."""
+        """Lift parts that have lain, each of them as pads of ten seconds; returns when they are gone (s)."""
         for part in list(parts):
             self.lying.remove(part)
             rise, fall, alive = *self.rng.uniform(0.08, 0.6, 2), float(part.kind != "thing")
@@ -291,7 +291,7 @@ class _Story:
         return [part for part in self.lying if part.kind != "thing"]
 
     def _posture(self, kind: str, now: float) -> None:
-        """An arm, a hand or a thigh is laid down, from whichever side the body is."""
+        """Lay down an arm, a hand or a thigh, from a random side."""
         draw, side = self.rng.uniform, int(self.rng.integers(4))
         names, shares = zip(*POSTURES[self.place].items(), strict=True)
         kind = kind or str(self.rng.choice(names, p=shares))
@@ -310,7 +310,7 @@ class _Story:
         self.lying += [replace(part, at=turn @ (part.at - 4) + 4, points=part.points @ turn.T) for part in parts]
 
     def _back(self, now: float, hand: Person) -> float:
-        """An arm that left for a gesture lies again, as long as it would have."""
+        """Lay an arm that left for a gesture down again, unless it would have left for good by now."""
         if self._arm() or "leave" not in (kind for _, kind in self.agenda):
             return now
         self._posture("", now)
@@ -330,7 +330,7 @@ class _Story:
         return now + 0.7
 
     def _again(self, kind: str, now: float) -> float:
-        """The same arm once more, a little elsewhere: shifted, in which it may hang on, or after seconds in the air."""
+        """Lay the same arm a little elsewhere: shifted, perhaps without a gap, or after seconds in the air."""
         parts, step = self._arm(), self.rng.normal(0, 0.8, 2)
         gap = float(self.rng.choice([-0.3, -0.15, 0.1, 0.4]) if kind == "shift" else self.rng.uniform(1.0, 8.0))
         if not parts:
@@ -357,7 +357,7 @@ class _Story:
         self._note("thing", now, now + stay)
         return now + 0.5
 
-    # What fingers do.
+    # Movements of fingers.
 
     def _play(self, now: float, hand: Person) -> float:
         """A hand lies, and one of its fingers taps or strokes."""
@@ -422,10 +422,10 @@ class _Story:
             now = self._add(pad, now) + float(self.rng.uniform(0.12, 0.45))
         return now
 
-    # What is meant.
+    # Meant gestures.
 
     def _gesture(self, now: float, hand: Person) -> float:
-        """A gesture comes to mind: it is made at once, after what is going on, or when all is quiet."""
+        """Make or plan a gesture: beside what lies there, after it, after the next contact, or when all is quiet."""
         if self.lying:
             if self._room() is not None and self.rng.random() < 0.7:
                 return self._mean(max(now, self.last + 0.2))
@@ -449,7 +449,7 @@ class _Story:
         return (best[:2], best[2:]) if (best[2:] - best[:2]).min() > 4.2 else None
 
     def _mean(self, start: float) -> float:
-        """Make a gesture, of which the truth is written down; when it is over (s)."""
+        """Make a gesture and record its truth; returns when it is over (s)."""
         done, gap = perform(str(self.rng.choice(GESTURES)), self.rng, self.person), start - self.last
         how = "after" if gap <= 1.0 else "middle" if gap < 5.0 else "quiet"
         if self.lying and (room := self._room()):
@@ -460,7 +460,7 @@ class _Story:
 
 
 def _fitted(done: Performance, low: Array, high: Array) -> Performance:
-    """The same movement between two corners, smaller where it must be."""
+    """The same movement between two corners, made smaller if it does not fit."""
     ways = [np.stack([pad.x, pad.y], axis=1) for pad in done.pads]
     least, most = np.concatenate(ways).min(axis=0), np.concatenate(ways).max(axis=0)
     room = high - low - 1.4
@@ -473,17 +473,18 @@ def _fitted(done: Performance, low: Array, high: Array) -> Performance:
 
 
 def story(seed: int, level: str = "nominal", length: float = LENGTH_S) -> _Story:
-    """What the person with this seed does at his place in so many seconds."""
+    """The story of the person with this seed at the seed's place, `length` s long."""
     told = _Story(np.random.default_rng([seed, 2027, LEVELS.index(level)]), PLACES[seed % len(PLACES)], level, length)
     told.live()
     return told
 
 
 def live(seed: int, level: str = "nominal", length: float = LENGTH_S) -> Life:
-    """So many seconds of the person with this seed, at the place that is his, at a sensor of his own."""
+    """`length` s of the person with this seed, at the seed's place and on a sensor of that person's own."""
     told = story(seed, level, length)
     rng, sensor = told.rng, draw_sensor(told.rng, level)
-    # Sheets drift by what fits a minute; over half an hour a cabin warms towards an end, and a heater comes and goes.
+    # A sheet's drift is drawn for a minute. Over half an hour a cabin warms towards a limit, and a heater goes on and
+    # off.
     share, pace, heater = rng.uniform(-1, 1), rng.uniform(240.0, 1200.0), rng.uniform(120.0, 600.0)
     sensor = replace(sensor, drift=sensor.counts * share * (0.05 if level == "hard" else 0.02))  # assumed
     all_of_it = Performance("life", tuple(told.pads), length)

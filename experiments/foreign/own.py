@@ -1,10 +1,9 @@
-"""Judge gestures of one's own on the independent generator: the same person, kinds that no model has learned from it.
+"""Judge own gestures on the independent generator: each person enrols kinds that no model has learned from it.
 
     python -m experiments.foreign.own --model cnn_lstm --people 10
 
-A kind is performed as that generator does it, which is any way at all (a zigzag in any direction): a person who repeats
-himself is easier. So this is reported, not promised; and recall by kind, after as many examples each, says which kinds
-are the same thing each time.
+That generator performs a kind in any way at all (a zigzag in any direction), which is harder than a person who repeats
+a movement. So the figures are reported, not promised. Recall by kind shows which kinds are alike each time.
 """
 
 import argparse
@@ -34,28 +33,28 @@ PERFORMED = (
 )  # fmt: skip
 TRIALS = EXAMPLES + 4  # of each kind
 OTHER_TRIALS = 4
-SHOWN = (1, 3, 5)  # examples
+SHOWN = (1, 3, 5)  # numbers of examples
 
 
 @dataclass(frozen=True)
 class Seen:
-    """One segment: what was done, where it lies, and what the model makes of it."""
+    """One segment: what was performed, its place in the model's space, and what the model answers."""
 
     kind: str
     place: Array
     known: bool
-    claimed: bool  # whether it would be refused as an example
+    claimed: bool  # it would be refused as an example
 
 
 def segments(performed: Performance, sensor: object, rng: np.random.Generator) -> list[Segment]:
-    """What the front end cuts out of one performance."""
+    """The segments that the front end cuts out of one performance."""
     start = 1.4 + float(rng.uniform(0.0, 0.4))
     frames, times, _ = record(sensor, rng, [(start, performed)], start + performed.duration + 1.4)
     return cuts(frames, times)
 
 
 def done(model: Model, seed: int, level: str) -> Iterator[Seen]:
-    """Everything that one person does at one sheet."""
+    """The first segment of each thing that one person does at one sheet."""
     assert model.space is not None
     rng = np.random.default_rng([seed, 77, LEVELS.index(level)])
     person, sensor = draw_person(rng, level), draw_sensor(rng, level)
@@ -69,14 +68,14 @@ def done(model: Model, seed: int, level: str) -> Iterator[Seen]:
 
 
 def taken(space: Space, prototypes: dict[str, Prototype], chosen: list[Seen]) -> Array:
-    """How many of what was chosen are answered with an own gesture, and of how many."""
+    """(2,) how many chosen segments are answered with an own gesture, and how many there are."""
     matches = [(one, nearest(space, prototypes, one.place)) for one in chosen]
     own = [match and match.confidence >= NEAR and (not one.known or match.nearer) for one, match in matches]
     return np.array([sum(map(bool, own)), len(own)], np.float64)
 
 
 def judge(model: Model, people: int, level: str) -> Table:
-    """Recall by kind and by the number of examples, how many people could enrol it, and what else is taken."""
+    """Recall by kind and number of examples, how many people could enrol each kind, and what else is taken for it."""
     space = model.space
     if space is None:
         raise SystemExit(f"{model.name}: has no metadata 'own'")
@@ -114,7 +113,7 @@ def judge(model: Model, people: int, level: str) -> Table:
 
 
 def main() -> None:
-    """The command line."""
+    """Print and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", choices=LADDER, help="a shipped one (cnn_lstm)")
     parser.add_argument("--people", type=int, default=10, help="people (10)")

@@ -2,7 +2,7 @@
 
     python -m experiments.foreign.recordings foreign.npz --n 20 --level nominal
 
-Each take is another person at another sensor. What nobody can recognise is left out, as `judge` leaves it out.
+Each take is of another person at another sensor. Takes that nobody can recognise are left out, as in `judge`.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from gestured.record.recordings import Recordings
 
 
 def recordings(count: int, level: str = "nominal", first: int = 0) -> Recordings:
-    """So many takes of each gesture in the contract's form."""
+    """`count` takes of each gesture as recordings, less those that nobody can recognise."""
     takes = [take(kind, seed, level) for kind in GESTURES for seed in range(first, first + count)]
     takes = [one for one in takes if visible(one)]
     return Recordings(

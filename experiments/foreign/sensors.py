@@ -43,7 +43,7 @@ class Sensor:
     scan: float  # share of the frame's time that the read-out takes
     jitter: float  # s
     lost: float  # probability
-    top: float  # counts where the converter ends
+    top: float  # counts at which the converter saturates
     scale: float | None  # None: uint16 counts; else float32, counts times this
 
 
@@ -140,7 +140,7 @@ def _pink(rng: Rng, count: int, cells: int) -> Array:
 
 
 def _times(sensor: Sensor, rng: Rng, length: float) -> Array:
-    """Arrival times: jittered, some frames lost, strictly increasing."""
+    """Arrival times (s): jittered, some frames lost, strictly increasing."""
     times = np.arange(int(length * sensor.rate_hz) + 1) / sensor.rate_hz
     keep = rng.random(len(times)) >= sensor.lost
     times = times + rng.normal(0.0, sensor.jitter, len(times)).clip(-0.3 / sensor.rate_hz, 0.3 / sensor.rate_hz)
@@ -175,9 +175,9 @@ def record(
 ) -> tuple[NDArray[np.uint16] | NDArray[np.float32], Array, Array]:
     """Record `length` seconds in which the performances begin at the given times.
 
-    The sensor drifts by its `drift` times what `warming` says of the times (s), which without one are the times.
-    Returns frames (N, R, C), times (N,) in seconds, and what is to be seen in each frame (N,): the
-    strongest true signal of a living taxel in units of all its noise together.
+    The sensor drifts by `drift` times `warming(times)`, or times the seconds themselves without `warming`. Returns
+    frames (N, R, C), times (N,) in seconds, and what can be seen in each frame (N,): the strongest true signal of a
+    working taxel, in units of all its noise together.
     """
     times = _times(sensor, rng, length)
     load = np.zeros((len(times), sensor.rows, sensor.columns))
