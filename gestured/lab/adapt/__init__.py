@@ -1,10 +1,10 @@
-"""`gestured-lab adapt`: a shipped model goes on learning, from somebody's own recordings.
+"""`gestured-lab adapt`: a trained model learns further, from a user's own recordings.
 
-The rooms, in the order in which a run goes through them:
+The modules, in the order in which a run uses them:
 
     weights     the networks of an .onnx file, as they were trained
-    material    somebody's own recordings, cut as the daemon cuts, and who is held out
-    learning    the simulated takes beside them, and a few hundred steps from there
+    material    own recordings, cut as the daemon cuts, and who is held out
+    learning    the simulated takes beside them, and a few hundred training steps
     adaptation  people held out in turn, the decision, the threshold
-    command     the command line's side of it
+    command     the command line
 """

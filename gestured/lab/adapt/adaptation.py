@@ -1,9 +1,9 @@
-"""A model before and after: people held out in turn, the decision fitted on them, the threshold for no more wrong ones.
+"""Adaptation of a model, judged before and after: people held out in turn, then the decision and the threshold.
 
 Each group of people is judged by networks that have not learned from it, with a decision that was fitted on the others.
-Training moves the confidence more than the order of the answers, so both models are compared where they are wrong
-equally often: the threshold, one number, is the only one that is chosen on the answers that it is judged by. The model
-that is written has learned from all, and takes its decision and its threshold from all that was held out.
+Training changes confidences more than the order of the answers, so both models are compared at thresholds at which they
+are wrong equally often. The threshold is the only number that is chosen on the answers by which it is judged. The model
+that is written has learned from all people; its decision and threshold are fitted on all answers to held-out people.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,16 +30,16 @@ from gestured.simulator import GESTURES, NONE
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers to samples: one row each; gestures that were never cut out have rows, too, without an answer."""
+    """Answers to samples, one row each, and rows without an answer for gestures that were never cut out."""
 
     known: NDArray[np.bool_]  # (N,) a gesture of the model was performed
-    right: NDArray[np.bool_]  # (N,) the best score is its
-    confidence: NDArray[np.float64]  # (N,) -1 where nothing was cut out
-    unit: NDArray[np.int64]  # (N,) who performed it: what intervals are drawn over
+    right: NDArray[np.bool_]  # (N,) the best score is that gesture's
+    confidence: NDArray[np.float64]  # (N,) -1 if nothing was cut out
+    unit: NDArray[np.int64]  # (N,) the person, session or stretch, over which intervals are drawn
 
     @classmethod
     def of(cls, samples: Samples, said: decide.Answers, missed: NDArray[np.int64]) -> "Answers":
-        """What is `said` of the samples; `missed` (M,) are the units of what was never cut out."""
+        """The answers `said` to samples; `missed` (M,) has the units of gestures that were never cut out."""
         lost = np.zeros(len(missed))
         known = samples.labels != NONE
         return cls(
@@ -50,7 +50,7 @@ class Answers:
         )
 
     def shares(self, least: float) -> "Shares":
-        """What they are worth, published from a confidence of `least` on."""
+        """The shares, with answers published from a confidence of `least` on."""
         published = self.confidence >= least
         known, others = self.known, ~self.known
         right, wrong = published & self.right, published & known & ~self.right
@@ -61,7 +61,7 @@ class Answers:
         return Shares(int(known.sum()), int(others.sum()), *low_high)
 
     def least_for(self, wrong: float, accepted: float = 1.0) -> float:
-        """The lowest confidence from which at most these shares of gestures are wrong and of others accepted."""
+        """The lowest confidence from which at most these shares of gestures are `wrong` and of others `accepted`."""
         order = np.argsort(-self.confidence, kind="stable")
         confidence, known = self.confidence[order], self.known[order]
         bad = np.cumsum(known & ~self.right[order]) / max(int(known.sum()), 1)
@@ -72,20 +72,20 @@ class Answers:
         return float(np.clip(np.nextafter(confidence[over[0]], 2.0), LOWEST, HIGHEST))
 
 
-LOWEST, HIGHEST = 0.05, 0.95  # of a threshold
+LOWEST, HIGHEST = 0.05, 0.95  # bounds of a threshold
 
 Interval = tuple[float, float, float]  # share, and the ends of its 95 % interval
 
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the gestures that were performed, and of the non-gestures; NaN where there are none."""
+    """Shares of the gestures that were performed, and of the non-gestures; NaN if there are none."""
 
     gestures: int
     others: int
     right: Interval
     wrong: Interval
-    unknown: Interval  # or never cut out
+    unknown: Interval  # of the gestures: unknown, or never cut out
     accepted: Interval  # of the non-gestures
 
     def as_dict(self) -> dict[str, object]:
@@ -98,13 +98,13 @@ class Shares:
         return found
 
 
-WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
-LOSS = 0.01  # share of the simulated gestures that may be lost, and of simulated non-gestures that may be accepted more
+WAYS = (0.25, 0.5, 0.75, 1.0)  # shares of the way from the old weights to the new ones
+LOSS = 0.01  # the most of the simulated gestures that may be lost, and of simulated non-gestures accepted in addition
 
 
 @dataclass(frozen=True)
 class Settled:
-    """Networks that went on, their decision and their threshold, and what they are worth on own recordings."""
+    """Adapted networks, their decision and threshold, and their shares on own recordings."""
 
     judged: Judged
     least: float  # the confidence from which an answer is published
@@ -112,21 +112,21 @@ class Settled:
     after: Shares
     way: float  # share of the way from the old weights to the new ones, one of `WAYS`
     groups: Groups
-    answers: Answers  # what the new model says of the people who were held out
+    answers: Answers  # the new model's answers to people who were held out
     apart: Sequence[tuple[Judged, Samples]]  # for each group of people: networks without it, and its samples
 
 
 @dataclass(frozen=True)
 class Adapted:
-    """The new model, and what both are worth on the simulated nominal recordings."""
+    """The new model, and the shares of both models on simulated nominal recordings."""
 
     new: Settled
-    provisional: Mapping[str, Any]  # when it may answer before the end
+    provisional: Mapping[str, Any]  # the rule for provisional events
     before: Shares
     after: Shares
 
     def reasons(self) -> list[str]:
-        """Why it is no better; empty where it is."""
+        """Why the new model is no better than the old one; empty if it is."""
         found = []
         old, new = self.new.before, self.new.after
         if not new.right[0] > old.right[0]:
@@ -146,7 +146,7 @@ class Adapted:
 
 
 def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
-    """Learn, hold out, fit, judge."""
+    """Adapt a model to own recordings, and judge both models."""
     start, least = base.judged, base.model.threshold
     new = settled(start, least, own, takes, course)
     before, after = _nominal(start, least, takes), _nominal(new.judged, new.least, takes)
@@ -154,7 +154,7 @@ def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
 
 
 def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Course) -> Settled:
-    """Go on from networks that publish from `least` on, with own recordings."""
+    """Train networks that publish from `least` on further, with own recordings."""
     groups = held_out(own)
     ends = [
         learned(start, takes.teach, own.samples.take(groups.of_samples != k), course, f"without {k + 1}/{groups.count}")
@@ -185,7 +185,7 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
 
 
 class _Run:
-    """What the networks without each group say of it, at each way, and the decisions that follow."""
+    """Answers of networks to the group that each has not seen, at each of `WAYS`, and decisions fitted on them."""
 
     def __init__(
         self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated, ends: Sequence[Judged]
@@ -205,20 +205,20 @@ class _Run:
             self._loss[way] = _losses(start, self.said[way], self._classes)
 
     def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
-        """Fitted for networks that go to `end`, on those of `others` who were held out; and the way that suits them."""
+        """A decision for networks on the way to `end`, fitted on held-out answers to `others`, and how far to go."""
         way = min(WAYS, key=lambda one: float(self._loss[one][others].mean()))
         check = self._takes.check
         both = opinions(between(self._start, end, way), check)
         rows = torch.from_numpy(others)
         evidence = Evidence.join([self.said[way].take(rows), both])
         own, made = int(others.sum()), len(check)
-        weight = np.concatenate([np.ones(own), np.full(made, own / made)])  # simulated ones count as much in all
+        weight = np.concatenate([np.ones(own), np.full(made, own / made)])  # simulated samples weigh as much in all
         classes = np.concatenate([self._classes[others], classes_of(check)])
         return refitted(self._start.decision, evidence.first, evidence.second, classes, weight), way
 
 
 def _losses(start: Judged, said: Evidence, classes: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(G,) how little each answer was expected."""
+    """(G,) negative log likelihood of what was performed, for each sample."""
     scores, unknown = said.answers(start.decision, start.verifier)
     known = classes < len(GESTURES)
     named = scores[np.arange(len(classes)), np.minimum(classes, len(GESTURES) - 1)] * (1 - unknown)
@@ -226,7 +226,7 @@ def _losses(start: Judged, said: Evidence, classes: NDArray[np.int64]) -> NDArra
 
 
 def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
-    """The rule for provisional events, from what networks say of samples that they have not learned from."""
+    """The rule for provisional events, from answers to samples that the networks have not learned from."""
     parts = [(new.judged, takes.check), (new.judged, takes.early), *new.apart]
     asked = [(nn.ModuleDict({"net": one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
     return Foretold.sessions(asked).rule("net", new.judged, new.least)
@@ -238,5 +238,5 @@ def _nominal(judged: Judged, least: float, takes: Simulated) -> Shares:
 
 
 def _least(answers: Answers, before: Shares) -> float:
-    """The lowest threshold with no more wrong ones, and no more non-gestures accepted, than the model before."""
+    """The lowest threshold with no more wrong answers, and no more accepted non-gestures, than before."""
     return answers.least_for(before.wrong[0], 1.0 if np.isnan(before.accepted[0]) else before.accepted[0])

@@ -1,4 +1,4 @@
-"""`gestured-lab adapt`: flags in, a model out, or the reason why not."""
+"""`gestured-lab adapt`: writes an adapted model, or says why it is no better."""
 
 import argparse
 import hashlib
@@ -45,13 +45,13 @@ def cache_folder() -> Path:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Adapt, say what it is worth, and write it where it is better or `--force` is given; else exit status 1."""
+    """Adapt a model, print its shares, and write it if it is better or `--force` is given; else exit status 1."""
     out: Path = args.out
     if out.suffix != ".onnx":
         raise GesturedError(f"--out: expected a file *.onnx, found {out}")
     if shipped_name(out) is not None:
         raise GesturedError(f"--out: {out} is a shipped model, which stays as it is; give the new one another name")
-    torch.set_num_threads(1)  # networks this small are slower on two, above all where something else computes
+    torch.set_num_threads(1)  # networks this small are slower on two threads, above all on a busy machine
     base = base_of(args.base)
     own = own_recordings(args.recordings, args.as_none)
     cache = args.cache or cache_folder()
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
-    """All of the model or nothing: what it needs for gestures of its user's own depends on the new weights."""
+    """Write the model, whole or not at all; what own gestures need is learned anew, since it depends on the weights."""
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / out.name
         export_net(found.new.judged, made, facts)
@@ -82,7 +82,7 @@ def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
 
 
 def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:
-    """What the new file says of itself."""
+    """The facts that the new file holds."""
     new, gestures = found.new, own.samples.take(own.samples.labels != NONE)
     cut = new.answers.confidence >= 0
     before = json.loads(base.model.properties.get(KEY, "[]"))

@@ -1,8 +1,8 @@
-"""A few hundred steps from a model's own weights, with somebody's recordings among simulated takes.
+"""A few hundred training steps from a model's weights, with own recordings among simulated takes.
 
-What was learned before is kept in two ways: most of every batch is simulated, and of the way that the weights went
-only a share is taken, which people decide who were held out (`adaptation`): a straight line between both ends keeps
-what either knows better than any single step count does (Wortsman et al. 2022, "Robust fine-tuning").
+Two things keep what was learned before: most of every batch is simulated, and the weights go only a share of the way,
+which is chosen on people who were held out (`adaptation`). Weights on the straight line between old and new ones keep
+what either knows better than any number of steps does (Wortsman et al. 2022, "Robust fine-tuning").
 """
 
 import copy
@@ -31,12 +31,12 @@ OTHER = len(CLASSES)  # a non-gesture of a kind that has no class
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Every number that shapes the steps, with its reason."""
+    """The numbers that shape the steps, each with its reason."""
 
     steps: int = 200  # some 15 seconds on one core
-    rates: tuple[float, float] = (6e-4, 4.5e-4)  # of the network and of its second opinion; they fall to 0
+    rates: tuple[float, float] = (6e-4, 4.5e-4)  # learning rates of the network and its second opinion; they fall to 0
     own_share: float = 0.4  # share of a batch that own samples may have
-    repeats: float = 40.0  # times that each own sample is shown, at most: few samples are few steps' worth
+    repeats: float = 40.0  # the most times that an own sample is shown: few samples get a small share of the batches
     fit: FitConfig = FitConfig()  # settings of a step that are those of training
 
 
@@ -52,7 +52,7 @@ class Simulated:
 
 
 def simulate(cache: Path, jobs: int) -> Simulated:
-    """A few thousand takes, from a seed; cut once, then from the cache."""
+    """The simulated takes, cut once and then read from the cache."""
     teach = simulated(cache, "wide", SEED, 4_000, jobs)
     check = simulated(cache, "wide", SEED + 1, 1_500, jobs)
     early = simulated(cache, "wide", SEED + 2, 12_000, jobs)
@@ -70,14 +70,14 @@ def classes_of(samples: Samples) -> NDArray[np.int64]:
 
 
 def learned(start: Judged, takes: Samples, own: Samples, course: Course, title: str) -> Judged:
-    """Go on from `start`; the decision stays as it was."""
+    """Train copies of the networks of `start` further; the decision stays as it was."""
     judged = copy.deepcopy(start)
     nets: list[Opinion] = [judged.net, judged.trajectory]
     config = course.fit
     optimiser, schedule = optimiser_of(nets, course.rates, config.decay, course.steps + 1)
     rng = np.random.default_rng([config.seed, 77])
     generator = torch.Generator().manual_seed(config.seed)
-    torch.manual_seed(config.seed)  # dropout, so that the same recordings give the same model
+    torch.manual_seed(config.seed)  # for dropout, so that the same recordings give the same model
     table = torch.cat([symmetry_table(CLASSES), torch.full((8, 1), OTHER)], 1)
     both = join([takes, own])
     classes, shown = classes_of(both), Shown(both, config.unfinished)
@@ -99,14 +99,14 @@ def between(start: Judged, end: Judged, share: float) -> Judged:
 
 
 def opinions(judged: Judged, samples: Samples) -> Evidence:
-    """What the network and its second opinion make of all samples, in their order."""
+    """The evidence of the network and its second opinion on all samples, in their order."""
     return Evidence.of(nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory}), "net", samples)
 
 
 def _batches(
     both: Samples, classes: NDArray[np.int64], taken: int, course: Course, rng: np.random.Generator
 ) -> Iterator[NDArray[np.int64]]:
-    """`steps` batches of samples of similar length: little is padded. Rare classes of the own ones count more."""
+    """`steps` batches of samples of similar length, for little padding; rare classes of own samples weigh more."""
     own, batch = len(both) - taken, course.fit.batch
     share = min(course.own_share, course.repeats * own / (course.steps * batch))
     weight = np.full(len(both), (1 - share) / taken)
@@ -123,7 +123,7 @@ def _batches(
 
 
 def _loss(logits: Tensor, y: Tensor, smoothing: float) -> Tensor:
-    """Cross entropy; of a non-gesture without a class, that it is any of the non-gestures."""
+    """Cross entropy; for a non-gesture without a class, that of all classes of non-gestures together."""
     log = logits.log_softmax(1)
     named = y < OTHER
     picked = log.gather(1, y.clamp(max=OTHER - 1)[:, None])[:, 0]

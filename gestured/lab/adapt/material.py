@@ -1,4 +1,4 @@
-"""What `adapt` learns from and judges on: somebody's own recordings, cut as the daemon cuts, and who performed them.
+"""Material of `adapt`: a user's own recordings, cut as the daemon cuts, and who performed them.
 
 A name that the model does not know is left out: it is neither taught nor rejected, so that it can still be enrolled.
 """
@@ -20,21 +20,21 @@ from gestured.record.check import SESSION, UNNAMED
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE
 
-MOST_PEOPLE = 1000  # more is another field, such as the number of the trial, where the participant belongs
-FEWEST = 20  # gestures; with fewer nobody can tell better from worse
+MOST_PEOPLE = 1000  # more are probably another field, such as the number of the trial
+FEWEST = 20  # gestures; fewer cannot tell a better model from a worse one
 LEAST_CUT = 2  # gestures that are cut out: one to learn from while the other is held out
 GROUPS = 5  # of people, each of which is held out in turn
 
 
 @dataclass(frozen=True)
 class Own:
-    """Samples of somebody's recordings, and the gestures that were performed and never cut out."""
+    """Samples of own recordings, and the gestures that were performed and never cut out."""
 
     samples: Samples  # `people` are places in `names`
-    sittings: NDArray[np.int64]  # (G,) of which session, or file of cut gestures, a sample is
+    sittings: NDArray[np.int64]  # (G,) the session, or file of cut gestures, of each sample
     names: tuple[str, ...]  # pseudonyms
     missed: NDArray[np.int64]  # (M, 2) person and sitting of each missed gesture
-    left_out: dict[str, int]  # how often a name of one's own was performed
+    left_out: dict[str, int]  # how often each name that the model does not know was performed
 
     @property
     def performed(self) -> int:
@@ -43,7 +43,7 @@ class Own:
 
 
 def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
-    """Read and cut. RecordingError or GesturedError in one sentence where nothing can be learned from them."""
+    """Read and cut recordings. Raises RecordingError or GesturedError if nothing can be learned from them."""
     names: dict[str, int] = {}
     parts: list[Samples] = []
     missed: list[tuple[int, int]] = []
@@ -90,11 +90,11 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
 
 @dataclass(frozen=True)
 class Groups:
-    """Who is held out together."""
+    """The groups that are held out in turn."""
 
-    unit: str  # of what a group is made
+    unit: str  # what a group is made of
     of_samples: NDArray[np.int64]  # (G,) 0 .. count - 1
-    unit_of_samples: NDArray[np.int64]  # (G,) over which intervals are drawn
+    unit_of_samples: NDArray[np.int64]  # (G,) the units over which intervals are drawn
     unit_of_missed: NDArray[np.int64]  # (M,)
 
     @property
@@ -104,7 +104,7 @@ class Groups:
 
 
 def held_out(own: Own) -> Groups:
-    """At most `GROUPS` groups of people; of one person, of sessions or files; of one sitting, of stretches of it."""
+    """At most `GROUPS` groups: of people; for one person, of sessions or files; for one sitting, of stretches of it."""
     owners = ((own.samples.people, own.missed[:, 0], "people"), (own.sittings, own.missed[:, 1], "sessions"))
     for units, lost, name in owners:
         different, counts = np.unique(units, return_counts=True)
@@ -118,7 +118,7 @@ def held_out(own: Own) -> Groups:
 
 
 def _dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int]:
-    """Each unit's group; the largest first, each into what is the smallest group by then."""
+    """The group of each unit; the largest units come first, each goes into the group that is smallest by then."""
     size = [0] * min(GROUPS, len(units))
     found = {}
     for k in np.argsort(-counts, kind="stable"):
@@ -187,7 +187,7 @@ def _cut(part: Recordings, path: Path) -> Samples:
 
 
 def _missed(part: Recordings, samples: Samples) -> list[int]:
-    """Whose gestures of a sitting were performed and not cut out: a person for each."""
+    """The person of each gesture of a sitting that was performed and not cut out."""
     if part.event_labels is not None and part.labels[0] == SESSION:
         performed = np.repeat(part.subjects[0], int(np.isin(part.event_labels, GESTURES).sum()))
     else:

@@ -1,8 +1,8 @@
 """The networks of a model file, as they were trained: what `adapt` starts from.
 
-An .onnx file holds every weight by its name in torch, but for those of an LSTM, whose gates ONNX keeps in another
-order and under no name, and for the shares of both opinions, which the calibration holds. Whether all were found is
-not believed: the networks must answer as the file does.
+An .onnx file holds every weight under its name in torch, with two exceptions: ONNX keeps the gates of an LSTM in
+another order and without names, and the shares of both opinions are in the calibration. The networks that were read are
+checked: they must answer as the file does.
 """
 
 import json
@@ -78,12 +78,12 @@ def untrained(kind: str, *, verified: bool = False) -> Judged:
 def read(proto: onnx.ModelProto, kind: str, calibration: Mapping[str, Any]) -> Judged:
     """The networks of an ONNX graph, their decision and their verifier, if it has one.
 
-    ValueError where the graph and the calibration do not hold every weight.
+    Raises ValueError if the graph and the calibration do not hold every weight.
     """
     stored = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
     judged = untrained(kind, verified="verifier.mean" in stored)
     found = _recurrent(judged, proto, stored) | _shares(calibration.get("temperature"))
-    if judged.verifier is not None:  # it replaces what the decision would reject by, which the graph does not hold then
+    if judged.verifier is not None:  # a verifier replaces the decision's rejection, whose weights the graph then lacks
         found |= _rejection(calibration)
     state = {}
     for name, expected in judged.state_dict().items():
@@ -138,7 +138,7 @@ def _rejection(calibration: Mapping[str, Any]) -> dict[str, NDArray[np.generic]]
 
 
 def _compare(judged: Judged, model: Model) -> None:
-    """ValueError where the networks answer otherwise than the file, to its own self-test and to noise."""
+    """Raises ValueError if the networks answer the self-test or noise otherwise than the file."""
     noise = np.random.default_rng(1).random((3, 20, WINDOW.rows, WINDOW.columns), np.float32)
     for values in (model.metadata.self_test.values, noise):
         expected = model.run(values)
