@@ -1,1 +1,1 @@
-"""The scientist's half: data, training, export, evaluation. Needs `[lab]`; the daemon never imports it."""
+"""The program `gestured-lab`: data, training, export, evaluation. Needs `[lab]`; the daemon never imports it."""

@@ -1,4 +1,4 @@
-"""Arrays that are kept from one run to the next, without pickles. A file that is damaged is as none."""
+"""Arrays that are kept from one run to the next, without pickles; a damaged file counts as missing."""
 
 import zipfile
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from gestured.lab.written import replaced
 
 
 def load(path: Path) -> dict[str, NDArray[Any]] | None:
-    """The arrays of a file by name; None where there is none, or where it is damaged, so that it is made again."""
+    """The arrays of a file by name; None if it is missing or damaged, so that it is made again."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             return dict(stored)

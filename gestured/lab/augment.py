@@ -1,4 +1,4 @@
-"""Variation of windows while training: always after the split, never before it."""
+"""Augmentation: variation of windows during training, always after the split and never before it."""
 
 import math
 
@@ -7,7 +7,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-# Each gesture stands in both, even if it keeps its name: what is missing would be taught its mirror image as itself.
+# Both tables hold each gesture, even if it keeps its name: a missing one would be trained on its mirror image under its
+# own name.
 TURN = {  # a quarter turn clockwise, as seen
     "one_tap": "one_tap", "double_tap": "double_tap",
     "swipe_up": "swipe_right", "swipe_right": "swipe_down", "swipe_down": "swipe_left", "swipe_left": "swipe_up",
@@ -25,9 +26,9 @@ MIRROR = {  # left to right
 
 
 def symmetry_table(classes: list[str]) -> Tensor:
-    """(8, K): what class each class becomes under mirroring (index + 4) and quarter turns clockwise (index % 4).
+    """(8, K) the class that each class becomes under mirroring (index + 4) and quarter turns clockwise (index % 4).
 
-    A class that is no gesture keeps its name where TURN and MIRROR do not say what it becomes.
+    A class that TURN and MIRROR do not hold keeps its name.
     """
     place = {name: i for i, name in enumerate(classes)}
     table = np.zeros((8, len(classes)), dtype=np.int64)
@@ -42,7 +43,7 @@ def symmetry_table(classes: list[str]) -> Tensor:
 
 
 def turned(x: Tensor, symmetry: int) -> Tensor:
-    """(B, T, R, C) mirrored and turned as the table says."""
+    """(B, T, R, C) windows, mirrored and turned by a symmetry of the table."""
     if symmetry >= 4:
         x = x.flip(3)
     return torch.rot90(x, -(symmetry % 4), (2, 3))
@@ -52,7 +53,7 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
     """(B, T, R, C) windows -> windows as another sensor, hand or network would have given them.
 
     Small rotation, scale and shift; gain of single taxels; response curve; crosstalk along rows and columns;
-    blur; noise; a lost frame bridged from its neighbours, as `Window` does. The peak is what it was at the end.
+    blur; noise; a lost frame bridged from its neighbours, as `Window` does. The peak stays as it was.
     """
     batch, time = x.shape[:2]
 
@@ -92,7 +93,7 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
         x = x.clone()
         x[index, lost] = keep * x[index, lost] + (1 - keep) * bridged
     noise = torch.randn(x.shape, generator=generator) * (0.08 * draw(batch, 1, 1, 1) ** 2) * some(0.5)
-    covered = (torch.arange(time)[None, :] <= _last(x)[:, None]).float()[:, :, None, None]  # padding stays silent
+    covered = (torch.arange(time)[None, :] <= _last(x)[:, None]).float()[:, :, None, None]  # padding gets no noise
     x = (x + noise * covered).clamp(min=0)
     return x / x.amax((1, 2, 3), keepdim=True).clamp(min=1e-3) * peak
 

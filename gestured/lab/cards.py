@@ -1,4 +1,4 @@
-"""Model cards: what a shipped model is, what it learned from, what it is worth and where it ends."""
+"""Model cards: what a shipped model is, what it learned from, how good it is and what its limits are."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from gestured.simulator import NON_GESTURES
 
 
 def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
-    """One Markdown file beside each model."""
+    """Write one Markdown file beside each model."""
     for name, found in figures.items():
         write(folder / f"{name}.md", _card(folder / f"{name}.onnx", name, found, plan))
 
@@ -30,7 +30,7 @@ def write_blocks(
 ) -> None:
     """Renew the tables of a folder's models: `figures` in the first document, `worst` of one model in the others.
 
-    GesturedError where their marks are missing.
+    Raises GesturedError if their marks are missing.
     """
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
     name, found = next(iter(figures.items()))
@@ -41,12 +41,12 @@ def write_blocks(
 
 
 def table(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """What each model is worth on each set that judged it."""
+    """A row for each model and each set that it was judged on."""
     return [*HEAD, *(row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, "))]
 
 
 def _worst(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Of each model and set the gesture, the person and the kind of non-gesture that fare worst."""
+    """For each model and set, the worst gesture, person and kind of non-gesture."""
     lines = [f"| the worst | {' | '.join(SETS)} |", f"|---{'|---' * len(SETS)}|"]
     for name, found in figures.items():
         sets = [*(found["simulated"].get(test, {}) for test in ("nominal", "wide")), found.get("real", {}).get(MIXED)]
@@ -85,7 +85,7 @@ WORST_OF = {
     "non-gesture": "non-gesture, rejected",
 }
 WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
-# Parts of a card between marks, which experiments write: of every model, and of the first one.
+# Marked parts of a card that experiments write: of every model, and of the first one.
 OF_ALL, OF_THE_FIRST = ("judged",), ("unseen", "seeds", "judged")
 HEAD = (
     "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
@@ -129,5 +129,5 @@ def _row(title: str, values: Mapping[str, Any]) -> str:
 
 
 def with_interval(share: float, ends: Mapping[str, float]) -> str:
-    """A share and, in brackets, where its interval begins and ends."""
+    """A share and, in brackets, the ends of its interval."""
     return f"{share:.3f} ({ends['low']:.3f}–{ends['high']:.3f})"

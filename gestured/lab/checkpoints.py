@@ -1,4 +1,4 @@
-"""Networks and half-finished runs on disk: plain arrays, without pickles."""
+"""Networks and interrupted training runs on disk: plain arrays, without pickles."""
 
 import warnings
 from pathlib import Path
@@ -11,7 +11,7 @@ from gestured.lab.arrays import load, save
 
 
 def store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epochs: int) -> None:
-    """A run after so many epochs: what `restore` needs to go on."""
+    """Store a run after so many `epochs`, from which `restore` can continue it."""
     arrays = {f"net.{name}": value.numpy() for name, value in nets.state_dict().items()}
     for i, state in optimiser.state_dict()["state"].items():
         arrays |= {f"optimiser.{i}.{name}": value.numpy() for name, value in state.items()}
@@ -21,7 +21,7 @@ def store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epo
 def restore(
     path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, schedule: torch.optim.lr_scheduler.LRScheduler
 ) -> int:
-    """Take up a run where `store` left it; returns the epochs that are done, 0 without a checkpoint."""
+    """Restore a run that `store` has stored; returns the epochs that are done, 0 without a checkpoint."""
     stored = load(path)
     if stored is None:
         return 0
@@ -35,7 +35,7 @@ def restore(
     optimiser.load_state_dict({**whole, "state": state})
     steps = int(next(iter(state.values()))["step"]) if state else 0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a step before the optimiser's
+        warnings.simplefilter("ignore", UserWarning)  # about a schedule that steps before its optimiser
         for _ in range(steps):
             schedule.step()
     return int(stored["epochs"])

@@ -26,9 +26,10 @@ FOLDERS = {
     "train": ("out", "cache"), "evaluate": ("models", "cache"), "adapt": ("cache",), "study": ("out", "cache"),
     "collect": ("out",),
 }  # fmt: skip
-KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that go on where they were interrupted
-INTERRUPTED = 130  # the exit status after Ctrl-C, as a shell has it
-# The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
+KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that can be continued after an interruption
+INTERRUPTED = 130  # the exit status after Ctrl-C, as in a shell
+# The module whose `run` each command is. It is imported only for that command, since some imports take seconds, or need
+# packages that others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",
     "evaluate": "gestured.lab.commands",
@@ -164,7 +165,7 @@ def parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that has not all letters shows question marks
+        sys.stdout.reconfigure(errors="replace")  # a terminal that lacks some letters shows question marks
     given = sys.argv[1:] if arguments is None else arguments
     try:
         from gestured.lab.made_of import command_of
@@ -172,18 +173,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         top = parser()
         top.set_defaults(words=command_of(["gestured-lab", *given]))
         return run(top, given)
-    except KeyboardInterrupt:  # while its modules were imported: nothing has been done
+    except KeyboardInterrupt:  # while modules were imported: nothing has been done
         return INTERRUPTED
 
 
 def _run(args: argparse.Namespace) -> int:
-    """Run a command, whatever it is."""
+    """Run the command that was asked for."""
     try:
         module = _program(args.command)
         _check(args)
         status: int = module.run(args)
         return status
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+    except BrokenPipeError:  # the reader of the output has closed it, as `head` does
         return 0
     except OSError as error:
         raise GesturedError(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error
@@ -194,10 +195,10 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _program(command: str) -> ModuleType:
-    """The module that runs a command; GesturedError where a package of the extra [lab] is missing.
+    """Import the module that runs a command. Raises GesturedError if a package of the extra [lab] is missing.
 
-    Whoever asks for the end, as by Ctrl-C, waits meanwhile: a library of which half was imported ends in a traceback of
-    its own. SIGTERM alone would leave the processes behind that --jobs starts.
+    A request to stop, by Ctrl-C or SIGTERM, waits for the import, since a library that is half imported would end in a
+    traceback. SIGTERM alone would leave the processes behind that --jobs starts.
     """
     stop_as_by_ctrl_c()
     try:
@@ -211,7 +212,7 @@ def _program(command: str) -> ModuleType:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """GesturedError for what no command can work with."""
+    """Raise GesturedError for files and folders with which no command can work."""
     if getattr(args, "real", None) is not None and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
     file = getattr(args, flag := FILES.get(args.command, ""), None)

@@ -1,4 +1,4 @@
-"""`gestured-lab train` and `evaluate`, put together."""
+"""`gestured-lab train` and `gestured-lab evaluate`."""
 
 import argparse
 import json
@@ -22,7 +22,7 @@ from gestured.model.shipped import LADDER
 
 
 def run(args: argparse.Namespace) -> int:
-    """Either of the two; a folder that cannot be made is told of now, and not after half an hour."""
+    """Train or evaluate; marks and folders are checked first, since the work takes half an hour."""
     if args.command == "evaluate" and args.document:
         require_marks("figures", args.document[0])
         require_marks("worst", *args.document[1:])
@@ -51,19 +51,19 @@ def train_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
 def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     """Print the figures, and keep them in the manifest, the cards and a document."""
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
-    models = {name: open_model(path) for name, path in paths.items()}  # what is wrong is said before anything is done
+    models = {name: open_model(path) for name, path in paths.items()}  # a faulty model is found before any work
     before = {name: measured(path) for name, path in paths.items()}
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
     found = simulated_figures(models, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of
-    with suppress(BrokenPipeError):  # what is written goes on without a reader
+    with suppress(BrokenPipeError):  # files are written even if nobody reads the output
         say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
     if args.quick and args.command == "evaluate":  # a card describes the plan that trained its model
         say("cards and manifest stay as they are: --quick judges too few gestures for them", to=sys.stderr)
     else:
-        kept = plain({name: before[name] | of for name, of in figures.items()})  # real figures stay where none are new
+        kept = plain({name: before[name] | of for name, of in figures.items()})  # real figures stay without new ones
         write_manifest(args.models, kept)
         write_cards(args.models, kept, plan)
     if args.document:

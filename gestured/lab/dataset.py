@@ -1,7 +1,7 @@
-"""Windows to learn from: recordings and simulated takes, cut by the very front end that the daemon runs.
+"""Training windows: recordings and simulated takes, cut by the front end that the daemon runs.
 
-Nothing here re-does the core's work: a take is pushed frame by frame through `FrontEnd`, and what it cuts is
-matched with what was performed. Simulated sets are cached, keyed by everything that makes them.
+A take is pushed frame by frame through `FrontEnd`, and its segments are matched with what was performed. Simulated sets
+are cached, keyed by everything that makes them.
 """
 
 import multiprocessing
@@ -53,8 +53,8 @@ IDLE = 20  # frames that are put on each side of a cut recording
 DAY_S = 720.0  # of one person's everyday life
 ANY_SENSOR = 0.5  # share of the days on any sensor; the others are on the nominal one
 FASTEST_HZ = 40.0  # of a day's sensor: faster ones cost more and show the same
-WATCH_S = 1.0  # between two looks whether processes are alive, where nothing is finished
-OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
+WATCH_S = 1.0  # s between two checks whether processes are alive, while no result comes
+OVERLAP = 0.5  # share of a performed gesture that must lie in a segment for the segment to carry its label
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Truth:
 
 
 def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segment]:
-    """(N, R, C) raw frames of one recording and their times (N,) -> what the front end cuts out of them."""
+    """(N, R, C) raw frames of one recording and their times (N,) -> the segments that the front end cuts out."""
     front = FrontEnd(*frames.shape[1:])
     found = [x for values, t in zip(frames, times, strict=True) for x in front.push(Frame(float(t), values))]
     found += front.flush(float(times[-1]) + front.timing.stale_s)
@@ -79,7 +79,7 @@ def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segmen
 def matched(segments: Iterable[Segment], performed: Sequence[Truth]) -> Iterator[Sample]:
     """Windows of the segments that hold a performed gesture, or nothing but a non-gesture.
 
-    A frame stands for the time up to its neighbours: contact is known to one frame only.
+    Segments are widened by a frame at both ends, since contact is known only to the frame.
     """
     frame = 1 / WINDOW.rate_hz
     for segment in segments:
@@ -107,14 +107,14 @@ def from_take(take: Take) -> list[Sample]:
 TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
 OTHER_TRIALS = tuple(
     (p, k, s) for p in range(34) for k in NON_GESTURES for s in SPEEDS
-)  # the same people do something else
+)  # non-gestures of the same people
 
 
 def from_day(life: Day) -> list[Sample]:
-    """The samples of some everyday life: all that was cut out of it, and what of it was meant.
+    """The samples of a day of everyday life, one for each segment that was cut out.
 
-    What nobody meant is of the kind EVERYDAY; a tap in truth, and what holds less than half of a gesture, are of kinds
-    from which nothing learns.
+    A segment that nobody meant is of the kind EVERYDAY, but LIKE_A_TAP if it is a tap all the same, and PART if it
+    holds less than half of a gesture. Nothing learns from the last two.
     """
     meant = [Truth(act.label, lay, act.participant, act.onset_s, act.offset_s) for act, lay in life.meant]
     like = [Truth(act.label, act.kind, act.participant, act.onset_s, act.offset_s) for act in life.like]
@@ -182,9 +182,9 @@ STREAMS: dict[str, Callable[[int, int], list[Sample]]] = {
 
 
 def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
-    """What is made of each number, in order, by so many processes at most; an interruption ends all of them.
+    """What `make` gives for each number, in order, by at most `jobs` processes; an interruption ends all of them.
 
-    GesturedError where one of them is killed: its work is lost, and the pool would wait for it for ever.
+    Raises GesturedError if one of them is killed: its work is lost, and the pool would wait for it for ever.
     """
     jobs = min(jobs, len(todo) or 1)
     others = multiprocessing.active_children()
@@ -193,7 +193,7 @@ def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title
             pool = multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
             stack.enter_context(pool)
         workers = [process for process in multiprocessing.active_children() if process not in others]
-        made = pool.imap(make, todo)  # in chunks it would give a generator, which knows no timeout
+        made = pool.imap(make, todo)  # with chunks it gives a generator, which has no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)
 
 
@@ -211,7 +211,7 @@ def _while_alive(made: "IMapIterator[T]", workers: Sequence[BaseProcess]) -> Ite
 
 
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
-    """The first `count` takes of one of `STREAMS`, from `cache` where they were made before."""
+    """The first `count` takes of one of `STREAMS`, from `cache` if they were made before."""
     path = cache / f"{stream}-{seed}-{count}-{code_digest(__name__)[:12]}.npz"
     if stored := load(path):
         return Samples(**stored)
@@ -222,7 +222,7 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
 
 
 def recorded(recordings: Recordings) -> Samples:
-    """Cut gestures or whole sessions as samples; what the truth does not name, and a single frame, is left out.
+    """Samples of cut gestures or whole sessions, without touches that the truth does not name, and single frames.
 
     People who have names become numbers, in the order of their names.
     """
@@ -236,7 +236,7 @@ def _recorded(recordings: Recordings, i: int, person: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     if len(times) < 2:
         return
-    # Marks are frames, and a frame stands for the time around it: a tap of one frame has a duration, too.
+    # Marks are frames, and a frame stands for the time around it, so a tap of one frame has a duration, too.
     half = float(np.median(np.diff(times))) / 2
     if recordings.labels[i] == "session":
         of, labels, kinds, onsets, offsets = (

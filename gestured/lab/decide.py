@@ -15,20 +15,20 @@ from torch import Tensor
 from gestured.lab.nets import Decision
 
 THRESHOLDS = tuple(round(0.05 + 0.01 * k, 2) for k in range(91))
-WRONG = 2.0  # points of lost gestures that a point of gestures taken for another one counts as much as
-BELIEF = 100.0  # samples' worth of loss for each number of an old decision that moves by one
-ACCEPTED = 0.25  # points of lost gestures that a point of non-gestures taken for a gesture counts as much as
+WRONG = 2.0  # points of lost gestures that weigh as much as a point of gestures taken for another one
+BELIEF = 100.0  # loss, in samples, of a number of the old decision that moves by one
+ACCEPTED = 0.25  # points of lost gestures that weigh as much as a point of non-gestures taken for a gesture
 
 Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:
-    """Fit the shares (temperatures) and the rejection on logits (N, K) of both, classes (N,); >= gestures is none."""
+    """Fit shares (temperatures) and rejection on logits (N, K) of both opinions, classes (N,); >= gestures is none."""
     decision = Decision(gestures)
     y = torch.from_numpy(labels)
     known = (y >= 0) & (y < gestures)
     one, two = first.log_softmax(1)[known, :gestures], second.log_softmax(1)[known, :gestures]
-    share = torch.tensor([0.0, 0.0], requires_grad=True)  # softplus of it
+    share = torch.tensor([0.0, 0.0], requires_grad=True)  # their softplus is `decision.share`
 
     def scores_loss() -> Tensor:
         s = torch.nn.functional.softplus(share)
@@ -39,7 +39,7 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
 
     _, cues = decision.cues(first, second)
     none = (~known).float()
-    # Every kind of non-gesture counts the same, and gestures as much as all of them together.
+    # Every kind of non-gesture weighs the same, and gestures weigh as much as all kinds together.
     counts = torch.bincount(y.clamp(min=0), minlength=int(y.max()) + 1).float()
     kinds = max(int((counts[gestures:] > 0).sum()), 1)
     weight = torch.where(known, 1.0 / known.sum(), 1.0 / counts.clamp(min=1)[y.clamp(min=0)] / kinds)
@@ -59,12 +59,10 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
 def refitted(
     start: Decision, first: Tensor, second: Tensor, classes: NDArray[np.int64], weight: NDArray[np.float64]
 ) -> Decision:
-    """A decision fitted again, but not from nothing: the old one is believed until enough people say otherwise.
+    """A decision fitted again, from an old one that is kept until enough samples say otherwise.
 
-    Shares and rejection for logits (N, K) of both opinions, classes (N,) and how much each sample counts (N,).
-
-    Non-gestures count as much as gestures, however many there are: how often people do something else is not to be
-    learned from what somebody chose to record.
+    Takes logits (N, K) of both opinions, classes (N,) and the weight of each sample (N,). Non-gestures weigh as much as
+    gestures, however many there are, since a choice of recordings does not show how often people do something else.
     """
     decision = copy.deepcopy(start)
     gestures = decision.gestures
@@ -75,14 +73,14 @@ def refitted(
         return decision
     counts = torch.where(known, counts, counts * counts[known].sum() / counts[~known].sum())
     one, two = first.log_softmax(1)[known, :gestures], second.log_softmax(1)[known, :gestures]
-    shares = torch.log(torch.expm1(start.share.clamp(min=1e-3)))  # softplus of it
+    shares = torch.log(torch.expm1(start.share.clamp(min=1e-3)))  # the inverse of softplus
     old = [shares, start.weight, start.bias]
     raw, slope, bias = (value.detach().clone().requires_grad_() for value in old)
 
     def loss() -> Tensor:
         share = torch.nn.functional.softplus(raw)
         named = torch.nn.functional.cross_entropy(share[0] * one + share[1] * two, y[known], reduction="none")
-        decision.share = share  # the cues of a non-gesture depend on it
+        decision.share = share  # the cues depend on it
         _, cues = decision.cues(first, second)
         none = torch.nn.functional.binary_cross_entropy_with_logits(
             (cues * slope).sum(1) + bias, (~known).to(first.dtype), counts, reduction="sum"
@@ -98,7 +96,7 @@ def refitted(
 
 
 def minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
-    """Change the parameters until the loss is least (L-BFGS)."""
+    """Minimise the loss over the parameters (L-BFGS)."""
     optimiser = torch.optim.LBFGS(parameters, max_iter=200, line_search_fn="strong_wolfe")
 
     def closure() -> Tensor:
@@ -111,20 +109,20 @@ def minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
 
 
 def decided(decision: Decision, first: Tensor, second: Tensor) -> Answers:
-    """What a decision makes of both opinions' logits (N, K)."""
+    """The answers of a decision to both opinions' logits (N, K)."""
     with torch.no_grad():
         scores, unknown = decision(first, second)
     return scores.numpy(), unknown.numpy()
 
 
 def confidence(answers: Answers) -> NDArray[np.float32]:
-    """(N,) how sure each answer is of its best gesture."""
+    """(N,) the confidence of each answer in its best gesture."""
     scores, unknown = answers
     return np.asarray(scores.max(axis=1) * (1 - unknown))
 
 
 def calibration_of(decision: Decision, least: float) -> dict[str, Any]:
-    """The metadata `calibration` of networks that decide so, and publish from a confidence of `least` on."""
+    """The metadata `calibration` of networks with this decision that publish from a confidence of `least` on."""
     return {
         "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
         "unknown_weight": decision.weight.tolist(),
@@ -134,9 +132,9 @@ def calibration_of(decision: Decision, least: float) -> dict[str, Any]:
 
 
 def curve(answers: Answers, labels: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(len(THRESHOLDS), 3): right, wrong and accepted at each threshold, for classes (N,); from G on they are none.
+    """(len(THRESHOLDS), 3) right, wrong and accepted at each threshold, for classes (N,); from G on they are none.
 
-    Right and wrong are shares of the gestures, accepted is one of the non-gestures; NaN where there are none.
+    Right and wrong are shares of the gestures, accepted is one of the non-gestures; NaN if there are none.
     """
     scores, _ = answers
     known, right = labels < scores.shape[1], scores.argmax(axis=1) == labels
@@ -154,9 +152,9 @@ def curve(answers: Answers, labels: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 def threshold(answers: Answers, labels: NDArray[np.int64], sets: NDArray[np.int64] | None = None) -> float:
-    """The confidence from which on answers are published: where right ones are worth most against wrong and accepted.
+    """The confidence from which answers are published: the best balance of right, wrong and accepted ones.
 
-    `sets` (N,) says to which set each belongs (simulated, real ...): every set counts the same, however large.
+    `sets` (N,) has the set of each answer (simulated, real ...); every set weighs the same, however large.
     """
     of = np.zeros(len(labels), np.int64) if sets is None else sets
     scores, unknown = answers

@@ -1,6 +1,6 @@
-"""Digests of code and of files: the keys under which the lab keeps what takes long to compute.
+"""Digests of code and of files: the keys under which the lab keeps results that take long to compute.
 
-That of code sees what runs and nothing else: a changed comment, docstring or line break leaves it as it is.
+A digest of code depends only on what runs: a changed comment, docstring or line break leaves it as it is.
 """
 
 import ast
@@ -9,15 +9,15 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[1]  # not by importing it: all that it imports would be used, too
+PACKAGE = Path(__file__).resolve().parents[1]  # found without an import, since all that is imported counts as used
 
 
 @cache
 def code_digest(module: str, aside: frozenset[str] = frozenset()) -> str:
-    """SHA-256 of a module of gestured, such as `gestured.lab.fit`, and of all of gestured's that it uses.
+    """SHA-256 of a module of gestured, such as `gestured.lab.fit`, and of all modules of gestured that it uses.
 
-    A module is used that an import or a text names, anywhere in the code: programs are started by their name. Those
-    that are set `aside` do not count, nor what they alone use.
+    A module counts as used if an import or a string anywhere in the code names it, since programs are started by name.
+    Modules that are set `aside`, and modules that only these use, do not count.
     """
     found: dict[Path, str] = {}
     todo = list(_files(module))
@@ -46,7 +46,7 @@ def file_digest(path: Path) -> str:
 
 
 class _WithoutTexts(ast.NodeTransformer):
-    """Takes docstrings away, and whatever else is a text that nothing is done with."""
+    """Removes docstrings, and other constants that are statements of their own."""
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
         return None if isinstance(node.value, ast.Constant) else self.generic_visit(node)
@@ -65,7 +65,7 @@ def _named(tree: ast.Module) -> Iterator[str]:
 
 
 def _files(name: str) -> Iterator[Path]:
-    """Where a module's code is: one file, a package's own, or none where gestured has no module of this name."""
+    """The files of a module or package; none if gestured has no module of this name."""
     first, *parts = name.split(".")
     if first != PACKAGE.name or not all(part.isidentifier() for part in parts):
         return

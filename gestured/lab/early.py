@@ -1,10 +1,11 @@
 """When a provisional event may be given: thresholds by elapsed time, learned from people held out.
 
 Learn-then-Test (Angelopoulos and others, arXiv 2110.01052; for early decisions Ringel and others, ICML 2024, arXiv
-2402.00857, written anew from the papers): in each stretch of time since the onset the thresholds are tried from the
-safest one on, as long as a binomial test over people says that enough of the events they give are confirmed. Stretches
-follow one another: what was given in an earlier one is out of the later ones.
-`Foretold` is what networks say of contacts before they are over.
+2402.00857, written anew from the papers). In each stretch of time since the onset, thresholds are tried from the safest
+one on, as long as a binomial test over people says that enough of their events are confirmed. A contact that gets its
+event in one stretch is left out of the later ones.
+
+`Foretold` holds the answers of networks to contacts before they are over.
 """
 
 import math
@@ -27,11 +28,11 @@ from gestured.model.features import ACTIVE
 from gestured.simulator import GESTURES, NONE
 
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
-DOUBT = 0.1  # probability that a threshold is let through although it does not
-IN_A_ROW = 1  # frames that must be sure enough: a second one would cost 67 ms, and thresholds make up for it
+DOUBT = 0.1  # probability that a threshold passes although too few of its events are confirmed
+IN_A_ROW = 1  # consecutive frames that must be sure enough: a second one would cost 67 ms; thresholds make up for it
 STRETCHES = (0.0, 0.233, 0.367, 0.5, 0.7, 1.0)  # their beginnings in s, half-way between frames at 15 Hz
-STARTS = (120, 240, 480)  # people with an event; 112 is the least that a third of the doubt can be tested with
-# From the safest on, each step with a sixth more doubt (1 - confidence) than the one before.
+STARTS = (120, 240, 480)  # people with an event; fewer than 112 could never pass with a third of the doubt
+# Thresholds from the safest on, each with a sixth more doubt (1 - confidence) than the one before.
 LADDER = tuple(round(1 - float(doubt), 4) for doubt in np.geomspace(0.001, 0.5, 41))
 
 
@@ -40,7 +41,7 @@ Questions = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDA
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a model said at every frame of G contacts, and what it answered in the end; N questions in all."""
+    """N questions to a model, one at every frame of G contacts, and its answers in the end."""
 
     contact: NDArray[np.int64]  # (N,) 0 .. G-1, in order
     elapsed_s: NDArray[np.float64]  # (N,) since the contact's onset, increasing within it
@@ -56,19 +57,19 @@ class Asked:
 
 
 def given(sure_enough: NDArray[np.bool_], contact: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The questions at which events are given: of each contact the first one that is sure enough, in order."""
+    """The questions at which events are given: the first one of each contact that is sure enough, in order."""
     reached = np.flatnonzero(sure_enough)
     return reached[np.unique(contact[reached], return_index=True)[1]]
 
 
 def _revoked(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(P,) of each person, who counts once, the share of the events that were revoked."""
+    """(P,) the share of each person's events that were revoked."""
     _, who = np.unique(people, return_inverse=True)
     return np.bincount(who, revoked) / np.bincount(who)
 
 
 def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
-    """How likely so few revoked events are if less than `CONFIRMED` are confirmed: a binomial test over people."""
+    """The probability of so few revoked events if fewer than `CONFIRMED` are confirmed: a binomial test over people."""
     if not len(people):
         return 1.0
     each = _revoked(people, revoked)
@@ -78,11 +79,11 @@ def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
 def safe_from(
     sure: NDArray[np.float64], contact: NDArray[np.int64], wrong: NDArray[np.bool_], person: NDArray[np.int64]
 ) -> float | None:
-    """The lowest threshold that passes among the questions of one stretch, None for none.
+    """The lowest threshold that passes for the questions of one stretch, None for none.
 
-    `wrong` (N,) says of each question whether an event given there would be revoked; `person` (N,) whose it is. Testing
-    begins at several places, where so many people have an event as in `STARTS`, each with its part of the doubt: at the
-    safest threshold there are so few that a single revoked one would end it.
+    `wrong` (N,) says whether an event given at a question would be revoked; `person` (N,) whose question it is. The
+    test starts once for each of `STARTS`, at the first threshold that gives so many people an event, with an equal part
+    of the doubt. At the safest threshold so few people have one that a single revoked event would end the test.
     """
     chances: list[tuple[float, int, float]] = []
     for threshold in LADDER:
@@ -100,7 +101,7 @@ def safe_from(
 
 
 def deceives(questions: Questions, level: float) -> bool:
-    """Whether events at this threshold are surely revoked more often than allowed, though others' are not."""
+    """Whether events at this threshold are revoked significantly more often than allowed."""
     sure, contact, wrong, person = questions
     events = given(sure >= level, contact)
     if not len(events):
@@ -151,7 +152,7 @@ def published(answers: Answers, least: float | NDArray[np.float64]) -> NDArray[n
 
 
 def at_release(samples: Samples) -> Samples:
-    """The samples as they are when the finger has left for the first time: of two contacts the first one alone."""
+    """The samples up to the frame at which the finger first leaves: of two contacts the first one alone."""
     least, windows = floors(samples), []
     for i in range(len(samples)):
         window = samples.window(i)
@@ -166,9 +167,9 @@ def at_release(samples: Samples) -> Samples:
 
 
 def tap_threshold(answers: Answers, answer: NDArray[np.int64], person: NDArray[np.int64], tap: int) -> float | None:
-    """The confidence for a tap at the release, by what a model says of G contacts then and publishes in the end.
+    """The threshold for a tap at the release, by a model's `answers` to G contacts then and its `answer` in the end.
 
-    Contacts that a second tap follows are to be left out: nobody can know of it.
+    Contacts that a second tap follows must be left out: nobody can foresee it.
     """
     scores, unknown = answers
     exactly = scores.max(axis=1).astype(np.float64) * (1 - unknown)
@@ -182,19 +183,19 @@ OTHERS = 0.2  # share of non-gestures among what is performed, as in the session
 
 @dataclass(frozen=True, slots=True)
 class Foretold:
-    """Samples of people who were held out, with what each network makes of them."""
+    """Samples of people who were held out, with the evidence of each network on them."""
 
     samples: Samples
     whole: Evidences
-    released: Evidences  # when the finger has left for the first time
+    released: Evidences  # up to the frame at which the finger first leaves
     prefixes: Evidences  # at every touched frame
-    contact: NDArray[np.int64]  # (N,) whose prefix each is
+    contact: NDArray[np.int64]  # (N,) the sample that each prefix is of
     since: NDArray[np.int64]  # (N,) frames since its onset
     second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
 
     @classmethod
     def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
-        """Ask each part's networks about its samples, with so many non-gestures, drawn at random, as sessions hold."""
+        """Ask each part's networks about its samples, with as many non-gestures, drawn at random, as sessions hold."""
         parts = [(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts]
         whole: list[Evidences] = []
         released: list[Evidences] = []
@@ -208,7 +209,7 @@ class Foretold:
             contact.append(of + before)
             since.append(frames)
             asked_before = np.arange(len(of)) - np.searchsorted(of, of)
-            second.append(frames > asked_before)  # at some frame it was not touched
+            second.append(frames > asked_before)  # true after a frame that was not touched
             before += len(samples)
         together = join([samples for _, samples in parts])
         contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
@@ -219,11 +220,11 @@ class Foretold:
         scores, unknown = _said(self.prefixes, name, module)
         final = published(_said(self.whole, name, module), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
-        # As the run time has it: no tap while the finger is down, and in a second contact two taps or nothing.
+        # As at run time: no single tap while the finger is down, and a double tap in a second contact and nowhere else.
         tap, two_taps = GESTURES.index(ONE_TAP), best == GESTURES.index(DOUBLE_TAP)
         confidence[(two_taps != self.second) | (best == tap)] = 0.0
         asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
-        # Where the finger comes back nobody can know it at the release: that depends on how often people do so.
+        # Contacts to which the finger comes back are left out, since nobody can foresee it at the release.
         single = at_release(self.samples).lengths() == self.samples.lengths()
         scores, unknown = _said(self.released, name, module)
         people = self.samples.people[single]
@@ -232,7 +233,7 @@ class Foretold:
 
 
 def _said(of: Evidences, name: str, module: Judged) -> Answers:
-    """What a network and its second opinion answer together."""
+    """The joint answers of a network and its second opinion."""
     return of[name].answers(module.decision, module.verifier)
 
 

@@ -1,4 +1,4 @@
-"""The figures: what the exported files are worth on people they have never seen.
+"""The figures of models on people from whom they have not learned.
 
 Simulated figures are of the exported .onnx files themselves. Real figures are of networks that were trained without
 the subjects they are judged on (three folds).
@@ -36,13 +36,13 @@ from gestured.lab.verifier import Evidence
 from gestured.model.model import Model
 from gestured.simulator import GESTURES, NONE
 
-FEWEST = 20  # samples of a gesture, a person or a kind of which a share says something
-SHARES = ("right", "wrong", "lost", "rejected")  # of an evaluation, those that have intervals
+FEWEST = 20  # samples of a gesture, a person or a kind, below which no share is given
+SHARES = ("right", "wrong", "lost", "rejected")  # shares of an evaluation that have intervals
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What answers are worth on a set: shares of the gestures that were performed, and of the non-gestures."""
+    """How good answers are on a set: shares of the gestures that were performed, and of the non-gestures."""
 
     gestures: int
     others: int
@@ -51,7 +51,7 @@ class Evaluation:
     wrong: float
     lost: float  # to unknown, or never cut out
     rejected: float  # of the non-gestures
-    people: int = 0  # who performed; 0 where nobody said who
+    people: int = 0  # number of people who performed; 0 if it is not known
     intervals: dict[str, dict[str, float]] = field(default_factory=dict)  # low and high, 95 % over people, by name
 
 
@@ -64,8 +64,8 @@ def outcome(
 ) -> Evaluation:
     """Judge answers against classes (N,), published from a confidence of `least` on.
 
-    `performed`: how many gestures were performed, where some were never cut out. With `people` (N,) there are
-    intervals; as nobody knows whose the gestures are that were never cut out, these are lost in all that is drawn.
+    `performed`: how many gestures were performed, if some were never cut out. With `people` (N,) there are intervals;
+    since it is not known whose gestures were never cut out, their share is taken as fixed.
     """
     scores, _ = answers
     known = (labels >= 0) & (labels < scores.shape[1])
@@ -94,7 +94,7 @@ def _intervals(
     cut: float,
     people: NDArray[np.int64],
 ) -> dict[str, dict[str, float]]:
-    """Low and high of each of `SHARES`; `cut` is the share of the gestures that answers (N,) were given to at all."""
+    """Low and high of each of `SHARES`; `cut` is the share of the gestures that were cut out."""
 
     def ends(chosen: NDArray[np.bool_], of: NDArray[np.bool_]) -> NDArray[np.float64]:
         return np.array(interval(chosen[of], people[of])[1:])
@@ -112,7 +112,7 @@ def model_answers(model: Model, samples: Samples) -> Answers:
         return model.run(samples.features())
     scores = np.zeros((len(samples), len(model.gestures)), np.float32)
     unknown = np.zeros(len(samples), np.float32)
-    for length in np.unique(samples.lengths()):  # a window that is padded would seem to be over
+    for length in np.unique(samples.lengths()):  # a padded window would seem to be over
         same = np.flatnonzero(samples.lengths() == length)
         for index in np.array_split(same, -(-len(same) // 200)):
             scores[index], unknown[index] = model.run(
@@ -122,7 +122,7 @@ def model_answers(model: Model, samples: Samples) -> Answers:
 
 
 def simulated_figures(models: Mapping[str, Model], data: TrainingData) -> dict[str, dict[str, Any]]:
-    """Of each model and test set; with the share of each kind that was answered rightly."""
+    """The figures of each model on each test set, with the share of each kind that was answered rightly."""
     found: dict[str, dict[str, Any]] = {}
     for name, model in models.items():
         found[name] = {}
@@ -149,7 +149,7 @@ def _good(given: Answers, samples: Samples, least: float) -> NDArray[np.bool_]:
 def worst(given: Answers, samples: Samples, least: float) -> dict[str, tuple[str, float, int]]:
     """The gesture and the person that were named rightly least often, and the kind of non-gesture rejected least often.
 
-    Of each the share, and of how many samples it is; those with fewer than `FEWEST` samples are left out.
+    Each has its share and its number of samples; those with fewer than `FEWEST` samples are left out.
     """
     good, classes = _good(given, samples, least), targets(samples)
     meant, names = (classes >= 0) & (classes < len(GESTURES)), np.array(CLASSES)[classes]
@@ -165,7 +165,7 @@ def worst(given: Answers, samples: Samples, least: float) -> dict[str, tuple[str
 
 
 def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> Calibrated:
-    """What is calibrated on without some of the real samples; those that have a class stand at its end."""
+    """The calibration set without some of the real samples; those that have a class stand at its end."""
     left = ~held[targets(real) >= 0]
     keep = np.concatenate([np.ones(len(calibrated.labels) - len(left), bool), left])
     found = {name: x[torch.from_numpy(keep)] for name, x in calibrated.logits.items()}
@@ -173,10 +173,10 @@ def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> C
 
 
 def real_figures(plan: TrainingPlan, data: TrainingData, cache: Path) -> dict[str, Any]:
-    """Real subjects, each by the networks that have not seen them, calibrated without them.
+    """The figures on real subjects, by networks that were trained and calibrated without them.
 
-    The first network also before it learned from any real recording, which shows what real recordings bought. Networks
-    that are not in the cache are trained; where nothing real is to be judged none are needed.
+    The first network is also judged before it learned from any real recording, which shows what real recordings add.
+    Networks that are not in the cache are trained. Without real recordings there are no figures.
     """
     real = data.real
     if real is None:
@@ -210,7 +210,7 @@ def real_figures(plan: TrainingPlan, data: TrainingData, cache: Path) -> dict[st
 
 
 def _by_simulation(trained: Trained, name: str, data: TrainingData, real: Samples) -> dict[str, Any]:
-    """Real subjects by a network before it learned from any real recording, calibrated without any."""
+    """The figures on real subjects of a network before it learned from any real recording, calibrated without any."""
     assert trained.start is not None
     alone = Trained(trained.start, None)
     module, calibration, _ = judged(alone, name, calibration_set(alone, data), data)

@@ -1,4 +1,4 @@
-"""Trained networks and forests -> .onnx files that say all about themselves, and the manifest of a folder of them.
+"""Export of trained networks and forests to .onnx files with metadata, and the manifest of a folder of them.
 
 Every file is verified before it is written: ONNX's checker, everything that the daemon checks, and outputs
 against the trained model's own within `PARITY`, for batches and windows of many lengths.
@@ -39,7 +39,7 @@ CHECKED_LENGTHS = (1, 2, 15, 60, 500)  # frames
 
 @dataclass(frozen=True)
 class Facts:
-    """What a model's file says of it, whatever its kind."""
+    """The metadata of a model's file, of whatever kind."""
 
     kind: str
     version: str
@@ -49,13 +49,13 @@ class Facts:
     training_data: str  # sha256
     quantiles: Mapping[str, Any]
     classes: Sequence[str] | None = None  # all that the nets tell apart, gestures first
-    context: Sequence[str] | None = None  # names of what surrounds a segment that the graph takes in, too
+    context: Sequence[str] | None = None  # names of the context that the graph takes as its second input
     operating_points: Mapping[str, Any] | None = None  # thresholds by strictness, and what they cost
-    provisional: Mapping[str, Any] | None = None  # when an answer may be given before the end (`early`)
-    learned_from: Sequence[Mapping[str, Any]] | None = None  # `origins`; None where nobody knows
+    provisional: Mapping[str, Any] | None = None  # the rule for provisional events (`early`)
+    learned_from: Sequence[Mapping[str, Any]] | None = None  # `origins`; None if it is not known
 
     def metadata(self) -> dict[str, str]:
-        """As it stands in the file."""
+        """The metadata as strings, by key."""
         told = (origin.KEY, "classes", "context", "operating_points", "provisional")
         more: dict[str, Any] = {name: getattr(self, name) for name in told}
         known = {key: json.dumps(value, allow_nan=False) for key, value in more.items() if value is not None}
@@ -77,7 +77,7 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
     `forward` returns (scores (B, G), unknown (B,)), and perhaps an embedding (B, E). B and T stay open.
-    Raises ModelError where the file's outputs differ from torch's by more than `PARITY`, or a check fails.
+    Raises ModelError if the file's outputs differ from torch's by more than `PARITY`, or a check fails.
     """
     module = module.eval()
     rows, columns = facts.window.rows, facts.window.columns
@@ -97,8 +97,8 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
         traced = Path(directory) / "traced.onnx"
         # The tracer warns of whatever could be frozen into the graph; `_compare` finds what is.
         warnings.simplefilter("ignore")
-        # Not dynamo: with an LSTM its second export in a process silently fixes T (torch 2.13).
-        # An example batch of 2, so that no dimension is taken for a constant 1.
+        # Not with dynamo, whose second export of an LSTM in a process silently fixes T (torch 2.13). The example has a
+        # batch of 2, so that no dimension is taken for a constant 1.
         torch.onnx.export(
             module,
             given(_windows(2, 5, rows, columns), None),
@@ -117,7 +117,7 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
 def export_forest(forest: RandomForestClassifier, path: Path, facts: Facts, features: Sequence[str]) -> None:
     """Write a random forest over `features`; its classes are 0 .. G-1 for the gestures, the others for none.
 
-    The outputs are those of `forest_outputs`. Raises ModelError where the file's differ from the forest's own by more
+    The outputs are those of `forest_outputs`. Raises ModelError if the file's differ from the forest's own by more
     than `PARITY`, or a check fails.
     """
     count = len(facts.gestures)
@@ -143,7 +143,7 @@ def _finish(
     truth: Callable[[NDArray[np.float32]], Outputs],
     inputs: Sequence[NDArray[np.float32]],
 ) -> None:
-    """Metadata and self-test into the model, everything checked, then the file at once."""
+    """Put metadata and self-test into the model, check everything, and write the file at once."""
     proto.producer_name, proto.producer_version, proto.doc_string = "gestured", metadata["version"], ""
     proto.graph.name, proto.graph.doc_string = metadata["kind"], ""
     for node in proto.graph.node:
@@ -163,7 +163,7 @@ def _finish(
 def _compare(
     model: Model, truth: Callable[[NDArray[np.float32]], Outputs], inputs: Sequence[NDArray[np.float32]]
 ) -> None:
-    """ValueError where the file and the trained model answer differently, or a batch and its members."""
+    """Raises ValueError if file and trained model answer differently, or a batch and its members."""
 
     def outputs(batch: NDArray[np.float32]) -> Outputs:
         return (*model.run(batch), model.embed(batch)) if model.embeds else model.run(batch)
@@ -178,7 +178,7 @@ def _compare(
             *((found[n][: len(alone)], np.concatenate([a[n] for a in alone])) for n in range(len(found))),
         ):
             difference = math.inf
-            if one.shape == other.shape:  # an embedding is no probability: its values may be tens, with as many digits
+            if one.shape == other.shape:  # an embedding may have values of tens
                 difference = float(np.abs(one - other).max() / max(np.abs(other).max(), 1.0))
             if not difference <= PARITY:
                 raise ValueError(
@@ -188,7 +188,7 @@ def _compare(
 
 
 def _compare_beside(model: Model, truth: Callable[..., Outputs], inputs: Sequence[NDArray[np.float32]]) -> None:
-    """ValueError where the file and the trained model answer differently to what surrounds a segment."""
+    """Raises ValueError if file and trained model answer differently to the context of a segment."""
     rng = np.random.default_rng(0)
     for batch in inputs:
         beside = np.tile(CALM, (len(batch), 1)) + rng.normal(0.0, 1.0, (len(batch), len(CALM))).astype(np.float32)
@@ -200,7 +200,7 @@ def _compare_beside(model: Model, truth: Callable[..., Outputs], inputs: Sequenc
 def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.float32]:
     """(B, T, R, C) windows, the same on every call: moving blobs, faint noise, quiet frames at the end.
 
-    Of more than four one is all quiet and one all noise, which a recording cannot give but a net must bear.
+    Of more than four, one is all quiet and one all noise: no recording gives these, but a net must bear them.
     """
     random = np.random.default_rng([batch, length, rows, columns])
     t = np.linspace(0.0, 1.0, length)[:, None, None]
@@ -224,9 +224,9 @@ NAME = "manifest.json"
 
 
 def measured(model: Path) -> dict[str, Any]:
-    """What the manifest beside a model file holds of figures of this very file; empty where it knows another one.
+    """The figures of a model file in the manifest beside it; empty if the manifest has another file of this name.
 
-    ModelError where it is no manifest.
+    Raises ModelError if the manifest is none.
     """
     manifest = model.with_name(NAME)
     try:
@@ -238,7 +238,7 @@ def measured(model: Path) -> dict[str, Any]:
 
 
 def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
-    """Write `manifest.json` over the directory's .onnx files.
+    """Write `manifest.json` for the directory's .onnx files.
 
     `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
     is no model.
@@ -262,7 +262,7 @@ def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """The same with null for what is not a finite number: JSON has no NaN."""
+    """A JSON value with null for each number that is not finite, since JSON has no NaN."""
     if isinstance(value, Mapping):
         return {key: plain(of) for key, of in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,9 +1,9 @@
-"""Training, to be read aloud: the three networks together on simulated people, then a little on real fingers.
+"""Training: the three networks together on simulated people, then a little on real fingers.
 
-Stage one learns everything that is simulated, once. Stage two goes on from there with real recordings among the
-simulated ones; it is short, so that folds over real subjects can each have their own. Every batch is varied after
-the split (`augment`), and some of its windows are cut short (`prefixes`). Nothing is padded with meaning: the
-networks are told how long each window is.
+Stage one learns once from everything simulated. Stage two continues with real recordings among the simulated ones; it
+is short, so that each fold over real subjects can have its own. Every batch is varied after the split (`augment`), and
+some of its windows are cut short (`prefixes`). Padding has no meaning: the networks are given the length of each
+window.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,27 +25,27 @@ from gestured.lab.samples import EVERYDAY, WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
-REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
+REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # the classes of real non-gestures
 CLASSES: list[str] = [
     *GESTURES,
     *NON_GESTURES,
     EVERYDAY,
-]  # non-gestures are classes of their own: they reject better so
+]  # non-gestures are classes of their own, which improves rejection
 LONGEST = 80  # frames that a network is shown: five seconds and their context
 
 
 @dataclass(frozen=True, slots=True)
 class FitConfig:
-    """Every number that shapes a training run, with its reason."""
+    """The numbers that shape a training run."""
 
     epochs: int = 20
-    batch: int = 64  # half as many steps with 128 learned far less
+    batch: int = 64  # with 128, half as many steps learned far less
     decay: float = 1e-2
     smoothing: float = 0.03  # of labels: keeps the scores calibrated
     clip: float = 1.0
     unfinished: float = 0.4  # share of the windows that are cut short
     real_epochs: int = 3
-    real_rate: float = 0.15  # of the rates above
+    real_rate: float = 0.15  # share of the learning rates in `KINDS`
     real_share: float = 0.3  # of stage two's samples that are real
     real_samples: int = 12000  # simulated samples an epoch of stage two
     seed: int = 1
@@ -66,7 +66,7 @@ def build(names: Iterable[str] = NETS) -> nn.ModuleDict:
 
 
 def targets(samples: Samples) -> NDArray[np.int64]:
-    """(G,) class of each sample; -1 where its kind is none of `CLASSES`."""
+    """(G,) class of each sample; -1 if its kind is none of `CLASSES`."""
     place = {name: i for i, name in enumerate(CLASSES)}
     names = np.where(samples.labels == NONE, samples.kinds, samples.labels)
     return np.array([place.get(REAL_KINDS.get(str(n), str(n)), -1) for n in names], dtype=np.int64)
@@ -97,7 +97,7 @@ class Shown:
     def batch(
         self, index: NDArray[np.int64], rng: np.random.Generator, generator: torch.Generator
     ) -> tuple[Tensor, Tensor, int]:
-        """(B, T, R, C) windows, (B,) frames of each, and the row of `symmetry_table` that names what they show."""
+        """(B, T, R, C) windows, (B,) frames of each, and the row of `symmetry_table` for their classes."""
         symmetry = int(rng.integers(8))
         x, lengths = batch_of(self._samples, index)
         cut = torch.from_numpy(np.minimum(drawn(index, self._samples, self._asked, self._unfinished, rng), LONGEST))
@@ -119,7 +119,7 @@ def one_epoch(
     """Go once over `sets` of (samples, labels, chosen); returns the mean loss."""
     rng = np.random.default_rng([config.seed, epoch])
     generator = torch.Generator().manual_seed(config.seed * 1000 + epoch)
-    torch.manual_seed(config.seed * 1000 + epoch)  # dropout, so that a resumed run is the same
+    torch.manual_seed(config.seed * 1000 + epoch)  # for dropout, so that a resumed run is the same
     table = symmetry_table(CLASSES)
     criterion = nn.CrossEntropyLoss(label_smoothing=config.smoothing)
     nets.train()
@@ -164,7 +164,7 @@ def _plan(
 
 
 def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Sequence[str] = NETS) -> nn.ModuleDict:
-    """Stage one, on simulated samples; goes on where an interrupted run stopped."""
+    """Stage one, on simulated samples; resumes an interrupted run."""
     torch.manual_seed(config.seed)
     nets = build(names)
     labels = targets(samples)
@@ -184,7 +184,7 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
 
 
 def _fit_scale(net: TrajectoryNet, samples: Samples, chosen: NDArray[np.int64], config: FitConfig) -> None:
-    """Standardise its features by some of the chosen samples."""
+    """Standardise the net's features by some of the chosen samples."""
     some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
     with torch.no_grad():
         found = [trajectory_features(*batch_of(samples, some[i : i + 256])) for i in range(0, len(some), 256)]
@@ -192,7 +192,7 @@ def _fit_scale(net: TrajectoryNet, samples: Samples, chosen: NDArray[np.int64], 
 
 
 def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: FitConfig, title: str) -> nn.ModuleDict:
-    """Stage two: go on from `start` with real samples among the simulated ones."""
+    """Stage two: continue from `start` with real samples among the simulated ones."""
     torch.manual_seed(config.seed)
     nets = build(start)
     nets.load_state_dict(start.state_dict())
@@ -217,7 +217,7 @@ def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: Fi
 def balanced(
     labels: NDArray[np.int64], usable: NDArray[np.int64], count: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """`count` indices drawn so that rare classes come more often (square root of their number)."""
+    """`count` indices, drawn so that a class comes in proportion to the square root of its number."""
     weight = 1 / np.sqrt(np.bincount(labels[usable], minlength=len(CLASSES)))[labels[usable]]
     return rng.choice(usable, count, replace=True, p=weight / weight.sum())
 
@@ -241,10 +241,7 @@ def optimiser_of(
 
 
 def asked(samples: Samples, ask: Callable[[Tensor, Tensor], Sequence[Tensor]]) -> list[Tensor]:
-    """What is answered to all samples, in their order.
-
-    `ask` takes batches of windows of similar length, and the frames of each, as `batch_of` gives them.
-    """
+    """The answers of `ask` to all samples, in their order."""
     order = np.argsort(samples.lengths(), kind="stable")
     with torch.no_grad():
         found = [ask(*batch_of(samples, order[i : i + 256])) for i in range(0, len(order), 256)]
@@ -260,7 +257,7 @@ def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
 
 
 def kept_nets(path: Path, make: Callable[[], nn.ModuleDict]) -> nn.ModuleDict:
-    """The networks that `make` gives, from their file where they were made before."""
+    """The networks that `make` gives, from their file if they were made before."""
     stored = load(path)
     if stored is None:
         stored = {name: value.numpy() for name, value in make().state_dict().items()}

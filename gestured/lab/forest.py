@@ -1,4 +1,4 @@
-"""The forest at the ladder's end: grown on touch-pattern features, calibrated, and an ONNX graph that says the same.
+"""The forest at the ladder's end: grown on touch-pattern features, calibrated, and written as an ONNX graph.
 
 Its classes are 0 .. G-1 for the gestures, the others for none. Its scores are calibrated by a temperature.
 """
@@ -28,7 +28,7 @@ LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor 
 def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Answers:
     """(B, classes) probabilities of a forest -> calibrated scores (B, G) and unknown (B,), as in the file.
 
-    scores = softmax(log p / `temperature`) over the gestures; unknown is what the gestures leave.
+    scores = softmax(log p / `temperature`) over the gestures; unknown is the probability that they leave.
     """
     temperature = _temperature(calibration)
     named = np.asarray(probabilities, np.float64)[:, :gestures]
@@ -40,11 +40,11 @@ def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapp
 
 
 def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Mapping[str, Any]) -> onnx.ModelProto:
-    """The forest as tables that all trees walk at once, a level of depth at a time.
+    """The forest as tables that all trees walk at once, one level of depth at a time.
 
-    Not ONNX's tree ensemble: that is many times as large on disk, takes 200 MiB and more when it is opened
-    and a third of a second (173,000 nodes), and this is walked as exactly. The file holds the tables in the smallest
-    types that they fit into; what comes before the walk does not depend on the input, and is done once, at opening.
+    ONNX's tree ensemble is many times as large on disk, and takes 200 MiB and more and a third of a second to open
+    (173,000 nodes); these tables are as exact. The file holds them in the smallest types that they fit into. The nodes
+    before the walk do not depend on the input, and are computed once, at opening.
     """
     constants = {
         **_flatten(forest),
@@ -73,7 +73,7 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
     add("Equal", ["step_of", "no_step"], "is_leaf")
     add("Cast", ["is_leaf"], "leaves", **whole_numbers)
     add("CumSum", ["leaves", "first_axis"], "leaves_up_to")
-    add("Sub", ["leaves_up_to", "one_leaf"], "leaf")  # a leaf's row; of other nodes it is not asked
+    add("Sub", ["leaves_up_to", "one_leaf"], "leaf")  # a leaf's row; unused for other nodes
     add("Shape", ["features"], "shape")
     add("Gather", ["shape", "zero"], "batch")
     add("Concat", ["batch", "trees"], "walks", axis=0)
@@ -129,7 +129,7 @@ def around_thresholds(forest: RandomForestClassifier, count: int) -> NDArray[np.
 
 
 def rounded_down(exact: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Thresholds as float32, so that a float32 value goes the way it goes against the float64 itself."""
+    """Thresholds as float32, which a float32 value exceeds if and only if it exceeds the float64."""
     rounded = exact.astype(np.float32)
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
 
@@ -142,13 +142,13 @@ def _temperature(calibration: Mapping[str, Any]) -> float:
 
 
 def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:
-    """All trees in one set of tables, a tree after the other. A right child stands behind its left one."""
+    """All trees in one set of tables, one after the other; a right child follows its left one."""
     features, thresholds, steps, shares, roots = [], [], [], [], []
     base = 0
     for estimator in forest.estimators_:
         tree = estimator.tree_
         order = [0]  # new number -> old
-        step = np.zeros(tree.node_count, np.int64)  # how far on the left child stands; a leaf leads to itself
+        step = np.zeros(tree.node_count, np.int64)  # distance to the left child; 0 for a leaf, which leads to itself
         for new in range(tree.node_count):
             old = order[new]
             if tree.children_left[old] >= 0:
@@ -178,15 +178,15 @@ def _smallest(numbers: NDArray[np.int64]) -> NDArray[Any]:
 def grow_forest(
     teach: Samples, real: Samples | None, calibrate: Samples, seed: int, jobs: int
 ) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
-    """The touch-pattern forest of the paper's Table IV (depth 9), with a class for what is no gesture.
+    """The touch-pattern forest of the paper's Table IV (depth 9), with a class for non-gestures.
 
-    100 trees, half the paper's: the file is half as large, and answers people of whom it knows nothing as well.
-
-    Gives what `train.judged` gives: the forest, its calibration, and how it answers people that it has not seen.
+    It has 100 trees, half of the paper's: the file is half as large, and answers unknown people as well. Returns what
+    `train.judged` returns: the forest, its calibration, and figures of its answers to people that it has not seen.
     """
     samples = teach if real is None else join([teach, real])
     classes = np.minimum(_classes(samples), len(GESTURES))
-    # Each class counts as much as any other, and the real recordings, which know taps and swipes alone, for a fifth.
+    # All classes weigh the same, and a real recording a fifth of a simulated one, since real ones hold only taps and
+    # swipes.
     weights = np.where(np.arange(len(samples)) < len(teach), 1.0, 0.2)
     weights /= np.bincount(classes, weights)[classes]
     forest = RandomForestClassifier(100, max_depth=9, min_samples_leaf=2, n_jobs=jobs, random_state=seed)
@@ -204,7 +204,7 @@ def _classes(samples: Samples) -> NDArray[np.int64]:
 
 
 def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64]) -> dict[str, Any]:
-    """Temperature by likelihood; a threshold from which at most 6 % of the calibration gestures are wrong."""
+    """Temperature by likelihood; threshold for at most 6 % of gestures wrong and 10 % of non-gestures accepted."""
     known = labels < len(GESTURES)
     best: tuple[float, dict[str, Any]] | None = None
     for temperature in np.geomspace(0.2, 2.0, 24):

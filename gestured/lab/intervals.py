@@ -1,8 +1,8 @@
-"""95 % intervals over people: gestures of one person are alike, so people are what was drawn.
+"""95 % intervals over people: gestures of one person are alike, so people are the sample.
 
-Drawing six or ten people anew, as the percentile bootstrap does, covers the truth too seldom. Here
-the spread of a ratio over people (linearised, with their number less one) is taken with Student's t, on the logit of a
-share and on the logarithm of a rate.
+The percentile bootstrap over six or ten people covers the true value too seldom. Here the spread of a ratio over people
+(linearised, with their number less one) is taken with Student's t, on the logit of a share and on the logarithm of a
+rate.
 """
 
 import math
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CONFIDENCE_LEVEL = 0.95
-RULE_OF_THREE = 3.0  # where none of n was counted, the true share is at most 3 / n, at 95 %
+RULE_OF_THREE = 3.0  # if none of n was counted, the true share is at most 3 / n, at 95 %
 
 
 def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
-    """(N,) answers right or not, (N,) who gave the gesture -> share right, and its interval's ends.
+    """(N,) answers right or not, (N,) who gave the gesture -> the share right, and the ends of its interval.
 
-    Three times NaN for no gesture at all; from 0 to 1 of one person.
+    All three are NaN without any gesture; the interval is 0 to 1 for one person.
     """
     hits, owners = np.asarray(right, np.float64), np.asarray(people)
     if not len(hits):
@@ -38,9 +38,10 @@ def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
 
 
 def rate(counts: ArrayLike, hours: ArrayLike) -> tuple[float, float]:
-    """(P,) how often something happened to each person in (P,) hours -> the ends of the rate's interval.
+    """(P,) counts of each person in (P,) hours -> the ends of the rate's interval.
 
-    Where nothing happened the upper end is that of a Poisson count. Of one person the interval is that of chance alone.
+    If nothing was counted, the upper end is that of a Poisson count. For one person the interval is that of chance
+    alone.
     """
     found, spent = np.asarray(counts, np.float64), np.asarray(hours, np.float64)
     if not found.any():
@@ -51,7 +52,7 @@ def rate(counts: ArrayLike, hours: ArrayLike) -> tuple[float, float]:
 
 
 def summary(right: ArrayLike, people: ArrayLike) -> dict[str, float]:
-    """As `interval`, with names, rounded to a hundredth of a per cent; None where there is nothing."""
+    """As `interval`, with names, rounded to a hundredth of a per cent; NaN without any gesture."""
     values = interval(right, people)
     return {name: round(value, 4) for name, value in zip(("right", "low", "high"), values, strict=True)}
 
@@ -69,9 +70,9 @@ def _normal() -> float:
 
 
 def student(degrees: int) -> float:
-    """The t within which Student's distribution of so many degrees of freedom has its CONFIDENCE_LEVEL.
+    """The t with P(|T| < t) = CONFIDENCE_LEVEL, for Student's distribution of so many `degrees` of freedom.
 
-    Without scipy, which the daemon's environment has not: hours of one's own are judged there, too.
+    It needs no scipy, which the daemon's environment lacks: users judge their own hours there, too.
     """
     low, high = 0.0, math.pi / 2  # of atan(t / sqrt(degrees))
     for _ in range(60):

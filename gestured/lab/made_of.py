@@ -1,8 +1,8 @@
 """What a generated table was made of: one line above it with its command and digests.
 
-The digests are of models and files, and of the code that decides what the table says. A test compares the line with
-the files of the checkout, so that no table outlives the models that it speaks of. Where the table stands between marks
-of its own, the line also holds its digest, which finds figures edited by hand.
+The digests are of models and files, and of the code on which the table depends. A test compares the line with the files
+of the checkout, so that no table outlives its models. If the table stands between marks of its own, the line also holds
+its digest, which finds figures edited by hand.
 """
 
 import hashlib
@@ -21,8 +21,8 @@ LINE = re.compile(
     r"<!-- made by `([^`]+)`(?: of ((?:\S+ [0-9a-f]{12}(?:, )?)+))?"
     r"(?:; code (?P<code>[0-9a-f]{12})(?: of (?P<modules>[\w. ]+))?)?(?:; block [0-9a-f]{12})? -->"
 )
-# What decides which gesture a sensor's frames become. What carries frames, opens files and describes answers is set
-# aside: it changes no decision, and changes often.
+# DECIDES decide which gesture a sensor's frames become. CARRIES carry frames, open files and describe answers; they are
+# set aside, since they change often, but no decision.
 DECIDES = ("gestured.core.sensor", "gestured.model.model")
 CARRIES = frozenset((
     "gestured.core.address", "gestured.core.events", "gestured.core.osc", "gestured.core.owner", "gestured.core.wire",
@@ -34,14 +34,14 @@ OLDER = "**Made with models that no longer ship, or with older code; to be made 
 
 
 def made_of(command: str, files: Iterable[Path], code: Sequence[str] = DECIDES) -> str:
-    """The line, for a table that `command` prints of these files; `code`: the modules that decide what it says."""
+    """The line of a table that `command` prints of these files; `code`: the modules on which the table depends."""
     of = ", ".join(f"{name} {digest}" for name, digest in digests(files).items())
     modules = "" if code == DECIDES else f" of {' '.join(code)}"
     return f"<!-- made by `{command}`{of and f' of {of}'}; code {decides(tuple(code))}{modules} -->"
 
 
 def command_of(words: Sequence[str]) -> str:
-    """A command as a page names it: no folder of the machine that ran it, and not on how many of its cores."""
+    """A command as a page names it, without the folders and the number of cores of the machine that ran it."""
     left, found = iter(words), list[str]()
     for word in left:
         if word in ("--cache", "--jobs", "--real"):
@@ -60,16 +60,16 @@ def decides(code: tuple[str, ...] = DECIDES) -> str:
 
 
 def other_code(line: re.Match[str]) -> bool:
-    """Whether the code that decides a table is another one now than a `LINE` says."""
+    """Whether the code on which a table depends has changed since its `LINE`."""
     modules = line["modules"]
     return bool(line["code"] != (decides(tuple(modules.split())) if modules else decides()))
 
 
 def renew(document: Path, name: str, lines: Iterable[str]) -> None:
-    """Put these lines between the marks `name: begin` and `name: end` of a document. GesturedError without them.
+    """Put these lines between the marks `name: begin` and `name: end` of a document.
 
-    A line that `made_of` gave gets the digest of the others. Raises GesturedError also if a table would lose rows: then
-    an argument is missing, and whoever means it empties the block first.
+    A line that `made_of` gave gets the digest of the others. Raises GesturedError if a mark is missing, or if a table
+    would lose rows, since then an argument is missing; a table that is to shrink must be emptied first.
     """
     begin, end = _marks(name)
     text = document.read_text()
@@ -87,14 +87,14 @@ def renew(document: Path, name: str, lines: Iterable[str]) -> None:
 
 
 def require_marks(name: str, *pages: Path | None) -> None:
-    """GesturedError, before what takes hours, for a page without the marks that `renew` needs; None is no page."""
+    """Raise GesturedError, before hours of work, for a page without the marks that `renew` needs; None is no page."""
     for page in pages:
         if page is not None and not kept(page, name):
             raise GesturedError(f"--document: expected a page with the marks of `{name}`, found none in {page}")
 
 
 def signed(lines: list[str]) -> list[str]:
-    """The lines of a block; the one that says what they were made of has the digest of the others."""
+    """The lines of a block, with the digest of the others in the line that `made_of` gave."""
     at = next((n for n, line in enumerate(lines) if LINE.fullmatch(line)), None)
     if at is None:
         return lines
@@ -104,7 +104,7 @@ def signed(lines: list[str]) -> list[str]:
 
 
 def kept(document: Path, name: str) -> str:
-    """What a document says between the marks `name: begin` and `name: end`, with them; empty where it has none."""
+    """The text of a document from the mark `name: begin` to `name: end`, with both; empty if it has none."""
     begin, end = _marks(name)
     text = document.read_text() if document.exists() else ""
     return text[text.index(begin) : text.index(end) + len(end)] if begin in text and end in text else ""
@@ -120,6 +120,6 @@ def digests(files: Iterable[Path]) -> dict[str, str]:
 
 
 def others(line: re.Match[str], now: Mapping[str, str]) -> list[str]:
-    """The names of the files of a `LINE` whose digests are not what they are `now`."""
+    """The names of the files of a `LINE` whose digests differ from those of `now`."""
     named = (part.split() for part in (line[2] or "").split(", ") if part)
     return [name for name, digest in named if now.get(name) != digest]

@@ -2,8 +2,8 @@
 
 All take windows (B, T, R, C) float32, 0..1, at the model's grid and rate. Every answer is taken one frame after the
 last active one: an idle frame there says that the gesture is over, and more of them change nothing by construction. A
-window that ends in an active frame is one of a gesture that goes on, and is answered as such.
-In a batch that is padded, `lengths` (B,) are the true numbers of frames; without them all windows are as long.
+window that ends in an active frame is answered as a gesture that goes on. In a batch that is padded, `lengths` (B,) are
+the true numbers of frames; without `lengths` no window is padded.
 """
 
 import torch
@@ -22,7 +22,7 @@ def active_frames(x: Tensor) -> Tensor:
 
 
 def last_active(x: Tensor) -> Tensor:
-    """(B, T, R, C) -> (B,) int64 index of the last frame with contact, 0 where there is none."""
+    """(B, T, R, C) -> (B,) int64 index of the last frame with contact, 0 if there is none."""
     index = torch.arange(x.shape[1], dtype=x.dtype, device=x.device)
     return (active_frames(x) * index).amax(1).to(torch.int64)
 
@@ -34,7 +34,7 @@ def read_at(x: Tensor, lengths: Tensor | None = None) -> Tensor:
 
 
 class Opinion(nn.Module):
-    """A network: windows -> a state -> logits. Without `lengths` all windows of a batch are as long as it."""
+    """A network: windows -> a state -> logits. Without `lengths` no window of a batch is padded."""
 
     def embed(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
         """(B, T, R, C) -> (B, units): the state that the head sees."""
@@ -152,11 +152,11 @@ class Perceptron(Standardising):
 
 
 class Decision(nn.Module):
-    """Two opinions become one answer: calibrated scores, and the probability that it is no gesture.
+    """Combines two opinions into calibrated scores and the probability of no gesture.
 
     `first` and `second` give logits over G gestures and further classes of non-gestures. The scores are a
     softmax over the weighted sum of both (temperature scaling of each, Guo et al. 2017). The rejection is a
-    logistic regression on what each says of "no gesture", on how far they agree and on how sure they are.
+    logistic regression on both opinions' log-odds of no gesture, on how far they agree and on how sure they are.
     """
 
     CUES = 6
@@ -197,7 +197,7 @@ class Decision(nn.Module):
 
 
 class Verifier(Standardising):
-    """What both opinions say and remember, and what surrounded the segment -> the log-odds that nothing was meant."""
+    """Cues and states of both opinions, and the context of the segment -> log-odds that no gesture was meant."""
 
     def __init__(self, cues: int, embedding: int, context: int) -> None:
         inputs, units = cues + embedding + context, 64
@@ -211,7 +211,7 @@ class Verifier(Standardising):
 
 
 class Judged(nn.Module):
-    """What is exported: a recurrent net, the trajectory net as its second opinion, and the decision."""
+    """The exported module: a recurrent net, the trajectory net as its second opinion, and the decision."""
 
     def __init__(self, net: Opinion, trajectory: Opinion, decision: Decision, verifier: Verifier | None = None) -> None:
         super().__init__()
@@ -223,8 +223,8 @@ class Judged(nn.Module):
     def forward(self, frames: Tensor, context: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
         """(B, T, R, C), perhaps a context (B, K) -> scores (B, G) given a gesture, unknown (B,), embedding (B, E).
 
-        The embedding is what the two heads see: the recurrent net's state, then the trajectory net's hidden layer.
-        Where there is a verifier, it has the last word on `unknown`, and needs the context.
+        The embedding is the input of the two heads: the recurrent net's state, then the trajectory net's hidden layer.
+        A verifier decides `unknown` if there is one and a context is given.
         """
         state, hidden = self.net.embed(frames), self.trajectory.embed(frames)
         first, second = self.net.judge(state), self.trajectory.judge(hidden)

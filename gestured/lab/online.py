@@ -1,4 +1,4 @@
-"""Continuous sessions over UDP to a real daemon; its events from the Unix socket, scored against what was performed."""
+"""Continuous sessions over UDP to a real daemon, and its events judged against what was performed."""
 
 import time
 from collections.abc import Iterator
@@ -28,10 +28,10 @@ def takes(minutes: float, seed: int) -> Iterator[Take]:
 
 
 def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], float]:
-    """Send a take `speed` times as fast as it was to a daemon of its own.
+    """Send a take, `speed` times as fast as it was recorded, to a daemon of its own.
 
-    Returns its events, and the epoch time of the sensor's time 0. The sensor's clock rules: the daemon's first stamp is
-    the arrival of the first frame, and times after it are the sensor's.
+    Returns the daemon's events, and the epoch time of the sensor's time 0. The daemon stamps the first frame with its
+    arrival, and the later ones by the sensor's clock.
     """
     rows, columns = take.frames.shape[1:]
     with Engine(model, rows, columns, "--clock", "sensor") as engine:
@@ -40,7 +40,7 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
             closing(Sensor(engine.listen, Form("lab"))) as sensor,
         ):
             heard = read_ahead(line for _, line in subscriber.lines())
-            heard.get()  # the hello: from here on nothing is missed
+            heard.get()  # after the hello no event is missed
             epoch, start = time.time(), time.monotonic()
             first = float(take.sensor_times[0])
             for n in range(len(take.frames)):
@@ -49,7 +49,7 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
                 if wait > 0.002:  # in small bursts: a sleep for each frame would be the slowest part
                     time.sleep(wait)
                 sensor.socket.send(sensor.form.packet(Frame(t, take.frames[n]), int(take.counter[n]), epoch + t))
-            engine.close()  # it flushes what is open, and hangs up
+            engine.close()  # the daemon flushes what is open, and hangs up
             events = [line for line in iter(heard.get, None) if line["type"] in ("gesture", "unknown")]
     if sensor.unheard:
         raise GesturedError(f"{sensor.unheard} packets were refused by the daemon's port")
@@ -57,6 +57,6 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
 
 
 def tallied(take: Take, zero: float, events: list[dict[str, Any]]) -> tuple[Tally, list[Outcome]]:
-    """The tally of a take whose time 0 was at `zero` (epoch seconds), and what became of each gesture that was told."""
+    """The tally of a take whose time 0 was at `zero` (epoch seconds), and the outcomes of its events."""
     performed = [Performed(act.label, act.kind, zero + act.onset_s, zero + act.offset_s) for act in take.events]
     return judge.tallied(performed, events)

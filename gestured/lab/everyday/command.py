@@ -1,4 +1,4 @@
-"""`gestured-lab everyday`: plays hours in processes, judges what was said, and prints, draws and writes it."""
+"""`gestured-lab everyday`: plays hours in processes, judges the answers, and prints, draws and writes the figures."""
 
 import argparse
 import json
@@ -24,19 +24,19 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
-LEAST_S = 1.0  # s, the least that all recordings together last: a rate by the hour needs some time
+LEAST_S = 1.0  # s that all recordings together must last, for a rate by the hour
 
 
 @cache
 def rungs(source: str) -> tuple[Model, ...]:
-    """A model, and after it the shipped ones that know the same gestures; held open in each process."""
+    """A model, and after it the shipped ones that know the same gestures; kept open in each process."""
     first = open_model(source)
     others = [open_model(name) for name in LADDER if name != first.name]
     return (first, *(model for model in others if model.gestures == first.gestures))
 
 
 def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
-    """The `rungs` of a model that has this operating point; GesturedError for one that has not."""
+    """The `rungs` of a model that has this operating point; raises GesturedError if it has not."""
     models = rungs(source)
     if strictness not in (have := points_of(models[0])):
         raise GesturedError(
@@ -46,7 +46,7 @@ def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play, judge, print."""
+    """Play the hours, judge the answers, and print, draw and write the figures."""
     of = "" if args.strictness == USUAL else f", {args.strictness}"
     _check(args)
     arming = Arming(args.arming, args.seconds) if args.arming else None
@@ -71,22 +71,22 @@ def run(args: argparse.Namespace) -> int:
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
-    with suppress(BrokenPipeError):  # what is written goes on without a reader
-        tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
+    with suppress(BrokenPipeError):  # files are written even if nobody reads the output
+        tell(found, shown, args.json)  # printed first, since it is the work of hours, and a disk may be full
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
         write(args.svg, draw(found))
     if args.document:
         name, others = shipped_name(args.model), [shipped()[model.name] for model in models[1:]]
-        first = shipped()[name] if name else Path(args.model)  # a file of one's own may have a shipped one's name
+        first = shipped()[name] if name else Path(args.model)  # a user's own file may have a shipped model's name
         made = made_of(args.words, [first, *others, *([args.svg] if args.svg else [])])
         renew(args.document, block, [made, "", *map(str, shown)])
     return 0
 
 
 def _check(args: argparse.Namespace) -> None:
-    """GesturedError for options that do not go together, before anything is played."""
+    """Raise GesturedError for options that do not go together, before anything is played."""
     if args.document and args.recordings:
         raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
     if not 0 < args.seconds <= LONGEST_S:

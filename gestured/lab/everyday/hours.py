@@ -1,4 +1,4 @@
-"""What models say in hours that pass through the daemon's own path: false gestures, and what became of those meant."""
+"""Models judged in hours that pass through the daemon's own path: false gestures, and what became of meant ones."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,27 +22,27 @@ from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed, Said, verdicts, whose
 
 TAPS = (ONE_TAP, DOUBLE_TAP)
-LONGEST_STEP_S = 1.0  # from frame to frame that counts as heard or deaf; in a longer one the sensor was silent
-ASIDE_S = 0.2  # beyond the judge's tolerance: nothing within half a second of what nobody can name is counted
-NOT_READY, RESTARTING, HELD = "not ready", "restarting", "spent"  # in what a sensor is deaf
+LONGEST_STEP_S = 1.0  # s, the most of a step between frames that counts as deaf; in a longer one the sensor was silent
+ASIDE_S = 0.2  # s beyond the judge's tolerance: answers within half a second of an unnamed touch are not counted
+NOT_READY, RESTARTING, HELD = "not ready", "restarting", "spent"  # why a sensor is deaf
 
 
 @dataclass
 class Heard:
-    """What was said of one stretch, by each model, and whether the sensor could hear at all."""
+    """Each model's answers in one stretch, and how long the sensor was deaf."""
 
     place: str
     person: str
     contacts: int
     meant: list[Performed]
-    said: dict[str, list[Said]]  # by model, each at any confidence; of a contact that may be published at all
-    seconds: float = 0.0  # a sensor that was silent for longer than ABSENT_S was not there
+    said: dict[str, list[Said]]  # by model: answers to contacts that may be published at all, at any confidence
+    seconds: float = 0.0  # without silences, as far as they are longer than ABSENT_S
     deaf_s: dict[str, float] = field(default_factory=dict)
-    provisional: int = 0  # events of the first model where nothing was meant
+    provisional: int = 0  # provisional events of the first model while nothing was meant
 
     @property
     def hours(self) -> float:
-        """How long it took."""
+        """The length of the stretch in hours."""
         return self.seconds / HOUR_S
 
 
@@ -54,9 +54,9 @@ def hear(
     *,
     published: bool = False,
 ) -> Heard:
-    """Play a stretch to the first model, at its operating point, and show what was cut to the others, too.
+    """Play a stretch to the first model at its operating point, and give its segments to the other models, too.
 
-    With `arming` a gesture arms the sensor. Then, and with `published`, only what is published there is said.
+    With `arming` a gesture arms the sensor. With `arming` or `published`, only answers that are published count.
     """
     first, published = models[0], published or arming is not None
     scene = Scene(
@@ -86,7 +86,7 @@ def hear(
 
 
 def _deaf(front_end: FrontEnd, *, known: bool) -> str:
-    """Why no gesture can begin now, empty where one can. `known`: the idle sensor has been known before."""
+    """Why no gesture can begin now; empty if one can. `known`: the idle sensor has been known before."""
     if front_end.segmenter.phase is SPENT:
         return HELD
     if not front_end.ready:
@@ -114,20 +114,20 @@ def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Mo
 def _whose(
     gesture: str, onset: float, offset: float, meant: list[Performed], taps: list[Performed]
 ) -> Performed | None:
-    """The gesture that was meant then; where none was, the tap in truth, if a tap is said."""
+    """The gesture that was meant then; if none was, and the answer is a tap, the tap that nobody meant."""
     return whose(onset, offset, meant) or (whose(onset, offset, taps) if gesture in TAPS else None)
 
 
-FEW = 5  # people; of fewer an interval over them says nothing
-# Thresholds of a curve: closer to one another where few false gestures are left.
+FEW = 5  # people; an interval over fewer says nothing
+# Thresholds of a curve, denser at the end, at which few false gestures are left.
 LEVELS = np.round(np.concatenate([np.arange(0.05, 0.95, 0.01), np.arange(0.95, 0.9995, 0.001)]), 4).tolist()
 
-Least = float | Mapping[str, float]  # confidence from which a gesture is published, of all alike or by gesture
+Least = float | Mapping[str, float]  # confidence from which a gesture is published: one for all, or by gesture
 
 
 @dataclass
 class Hours:
-    """Some stretches of hours, judged at some thresholds of one model."""
+    """Stretches judged at thresholds of one model."""
 
     hours: float = 0.0
     contacts: int = 0
@@ -151,7 +151,7 @@ class Hours:
             if found != "false":
                 became[id(said.performed)] = found
             elif said.performed is not None and said.performed.label == NONE:
-                self.said["apart"] += 1  # only a tap in truth is no gesture here
+                self.said["apart"] += 1  # a tap that nobody meant is no false gesture
             else:
                 self.false[said.gesture] += 1
                 false += 1
@@ -168,12 +168,12 @@ class Hours:
         self.each[one.person] = hours + one.hours, before + false
 
     def interval(self) -> tuple[float, float]:
-        """95 % of false gestures an hour, over people; of fewer than FEW as if they came by chance."""
+        """The 95 % interval of false gestures an hour: over people, or by chance alone for fewer than FEW people."""
         hours, false = np.array(list(self.each.values()), float).T
         return rate([false.sum()], [hours.sum()]) if len(hours) < FEW else rate(false, hours)
 
     def figures(self) -> dict[str, Any]:
-        """All of it as JSON values."""
+        """The figures as JSON values."""
         low, high = self.interval()
         return {
             "hours": round(self.hours, 4),
@@ -192,7 +192,7 @@ class Hours:
 
 
 def judged(heard: Iterable[Heard], model: str, least: Least) -> Hours:
-    """Stretches at the thresholds `least` of a model."""
+    """Judge stretches at the thresholds `least` of a model."""
     hours = Hours()
     for one in heard:
         hours.add(one, model, least)
@@ -200,14 +200,14 @@ def judged(heard: Iterable[Heard], model: str, least: Least) -> Hours:
 
 
 def shares(became: Mapping[str, int]) -> dict[str, Any]:
-    """How many gestures were meant, and the shares of them that were right, wrong and missed; None of none."""
+    """How many gestures were meant, and the shares of them right, wrong and missed; None if none was meant."""
     total = sum(became.get(how, 0) for how in ("right", "wrong", "missed"))
     parts = {how: round(became.get(how, 0) / total, 4) if total else None for how in ("right", "wrong", "missed")}
     return {"meant": total, **parts}
 
 
 def points_of(model: Model) -> dict[str, Least]:
-    """The operating points of a model: thresholds by strictness; its one threshold where it has none."""
+    """The operating points of a model: thresholds by strictness; its one threshold if it has none."""
     if model.points is None:
         return {USUAL: model.threshold}
     return {name: dict(point.thresholds) for name, point in model.points.items()}
@@ -222,5 +222,5 @@ def cost(heard: Sequence[Heard], model: str, least: Least) -> dict[str, float | 
 
 
 def curve(heard: Sequence[Heard], model: str) -> list[dict[str, float | None]]:
-    """What one threshold of all gestures costs, from the lowest to the highest."""
+    """What one threshold for all gestures costs, from the lowest to the highest."""
     return [{"threshold": level} | cost(heard, model, level) for level in LEVELS]

@@ -8,7 +8,7 @@ from gestured.lab.everyday.report import RULED, Figures, not_right
 
 WIDTH, HEIGHT = 700, 460  # pixels
 MODELS = (("#0067a5", "o"), ("#b9480a", "s"), ("#96498a", "^"), ("#007a5a", "D"))  # colour and mark of each in turn
-LEAST_SHARE = 0.005  # a logarithm cannot show 0; what is less is drawn here
+LEAST_SHARE = 0.005  # a logarithm cannot show 0; lower shares are drawn here
 TITLE = "Missed or wrong against false gestures an hour"
 
 
@@ -19,7 +19,7 @@ def draw(found: Figures) -> str:
 
 
 def _figure(found: Figures) -> Figure:
-    least = 0.5 / found["hours"]  # nothing in so many hours is drawn at half a false gesture
+    least = 0.5 / found["hours"]  # no false gesture is drawn as half a one
     figure = sheet(WIDTH, HEIGHT)
     axes = figure.subplots()
     axes.loglog()

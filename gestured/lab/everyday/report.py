@@ -1,4 +1,4 @@
-"""The figures of hours of everyday contact as JSON values, and these as tables."""
+"""Figures of hours of everyday contact, as JSON values and as tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from gestured.lab.everyday.hours import FEW, Heard, Least, cost, curve, judged, 
 from gestured.lab.table import Table, Value
 from gestured.model.model import Model
 
-RULED = 0.5  # false gestures an hour that a reader looks for
+RULED = 0.5  # false gestures an hour, marked in the picture
 SHOWN = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)  # thresholds of the curve that the table has
 Figures = dict[str, Any]
 
@@ -16,7 +16,7 @@ Figures = dict[str, Any]
 def figures(
     heard: Sequence[Heard], models: Sequence[Model], strictness: Strictness, *, published: bool = False
 ) -> Figures:
-    """What the first model says at an operating point that it has, and the curves of all of them."""
+    """The figures of the first model at an operating point, and the curves of all models."""
     first = models[0]
     least: Least = 0.0 if published else points_of(first)[strictness]
     places = list(dict.fromkeys(one.place for one in heard if one.seconds))
@@ -42,7 +42,7 @@ def figures(
 
 
 def tables(found: Figures, kind: str) -> list[Table]:
-    """By place, by gesture, by what lay on the sensor, and by threshold; `kind` says whose hours they are."""
+    """Tables by place, by gesture, by what lay on the sensor, and by threshold; `kind` is the kind of the hours."""
     title = f"Everyday contact, {kind}: {found['model']}, {found['strictness']}"
     rows = [_place(name, of) for name, of in (*found["places"].items(), ("all", found))]
     notes = [f"The interval is over {found['people']} people."] if found["people"] >= FEW else []

@@ -31,16 +31,16 @@ class Stretch:
     frames: Iterable[Frame]
     setup: Setup  # the sensor's; only grid and mounting count
     meant: list[Performed]  # gestures
-    taps: list[Performed]  # which nobody meant, but which are taps in truth
-    contacts: int | None = None  # that nobody meant; None where only the front end can tell
+    taps: list[Performed]  # contacts that nobody meant, but that are taps
+    contacts: int | None = None  # contacts that nobody meant; None if only the front end can count them
     tap_gap_s: float = Timing().tap_gap_s
-    unnamed: Sequence[Performed] = ()  # what was performed, but nobody knows what it was
+    unnamed: Sequence[Performed] = ()  # touches of which nobody knows what they were
 
 
 def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
     """A simulated day of the person with this seed, at one of the places in turn.
 
-    With `wake` that gesture comes before each that is meant; they are told apart by what lay there, WAKING and WOKEN.
+    With `wake` that gesture comes before each meant one; the kinds of both are WAKING and WOKEN.
     """
     life = day(seed, list(PLACES.values())[(seed - FIRST) % len(PLACES)], seconds, wake=wake)
     taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
@@ -53,7 +53,7 @@ def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
 
 
 def recorded(path: Path) -> Iterator[Stretch]:
-    """The streams of a file. What was performed in them counts as meant, as far as an .npz tells; a tape tells nothing.
+    """The streams of a file. What was performed counts as meant if an .npz holds it; a tape does not hold it.
 
     Raises RecordingError.
     """

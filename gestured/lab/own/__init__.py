@@ -1,1 +1,1 @@
-"""Gestures of one's own: what a model needs to compare examples, learned and judged on simulated people."""
+"""Own gestures: the space in which a model compares examples, learned and judged on simulated people."""

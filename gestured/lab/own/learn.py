@@ -1,8 +1,8 @@
-"""The space in which a model compares examples, learned by playing enrolments through.
+"""The space in which a model compares examples of own gestures, learned from simulated enrolments.
 
-Each kind that somebody could perform is in turn the new gesture, of a person whom the space was not learned from, and
-with kinds that it was not learned from either; everything else that this person does must not be taken for it.
-`teach` writes what a model needs for its user's own gestures into its file.
+Each kind that somebody could perform is in turn the new gesture, in a space that was learned from other people and
+other kinds. Nothing else that this person does may be taken for the new gesture. `teach` writes the space into a
+model's file.
 """
 
 from collections.abc import Iterator
@@ -25,18 +25,18 @@ from gestured.model.model import Model
 from gestured.model.prototypes import Array, Prototype, Space
 
 ACCEPTED = (
-    0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised
+    0.015  # share of other non-gestures that a threshold lets through in simulation, below the 0.02 that is promised
 )
-TAKEN = 0.003  # share of the model's gestures that one gesture of the user's own may take from it in simulation
-DIRECTIONS = 64  # directions of the embedding that are kept at most
-TELLING = 0.05  # variance between gestures over that within one; a direction with less tells nothing
+TAKEN = 0.003  # share of the model's gestures that may be taken for one own gesture in simulation
+DIRECTIONS = 64  # the most directions of the embedding that are kept
+TELLING = 0.05  # variance between gestures over that within one; a direction with less is dropped
 DIAGONAL, EVEN = 0.1, 0.1  # shares of the diagonal and of a multiple of one in the pooled covariance: shrinkage
 FOLDS = 5  # groups of kinds, each held out in turn
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a model makes of what was played."""
+    """A model's answers to samples."""
 
     embedding: NDArray[np.float64]  # (N, E)
     best: NDArray[np.int64]  # (N,) the model's gesture
@@ -48,7 +48,7 @@ class Seen:
 
     @classmethod
     def by(cls, model: Model, samples: Samples) -> "Seen":
-        """Everything that was played, in batches of one length."""
+        """Run a model on all samples, in batches of one length."""
         lengths = samples.lengths()
         embedding: list[NDArray[np.float64]] = [np.zeros(0)] * len(samples)
         best, known = np.zeros(len(samples), np.int64), np.zeros(len(samples), bool)
@@ -63,13 +63,13 @@ class Seen:
         return cls(np.stack(embedding), best, known, samples.labels, samples.kinds, samples.people, model.gestures)
 
     def plans(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """(N,) which are repetitions, and (N,) of which plan: one person's one kind."""
+        """(N,) whether a sample is a repetition, and (N,) its plan: one person's one kind."""
         names = np.char.add(np.char.add(self.people.astype("U20"), "/"), self.kinds)
         return self.labels == PLAN, np.unique(names, return_inverse=True)[1]
 
 
 def learn(seen: Seen) -> Space:
-    """The space, its thresholds, slope and margin."""
+    """Learn the space, its thresholds, slope and margin."""
     everybody = np.ones(len(seen.labels), bool)
     space = _without_thresholds(seen, everybody)
     # The thresholds come from signs alone. The network has not learned signs, just as it has not learned what a user
@@ -89,7 +89,7 @@ def learn(seen: Seen) -> Space:
 
 
 def _slope(by_count: list[list["Trial"]], thresholds: tuple[float, ...]) -> float:
-    """Of the confidence: how surely what lies so far above its threshold is the gesture, as likely as all else."""
+    """The slope of the confidence: of a logistic regression over how far samples lie above their threshold."""
     ahead = [
         np.concatenate([getattr(trial, part).own - least for trial in some])
         for part in ("others", "again")
@@ -103,20 +103,20 @@ def _slope(by_count: list[list["Trial"]], thresholds: tuple[float, ...]) -> floa
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """How near some things that one person does are to his new gesture."""
+    """How near some samples of a person are to that person's new gesture."""
 
-    own: Array  # (n,) nearness to it
-    built_in: Array  # (n,) to the nearest of the model's gestures
-    known: NDArray[np.bool_]  # (n,) whether the model would publish one
+    own: Array  # (n,) nearness to the new gesture
+    built_in: Array  # (n,) nearness to the nearest of the model's gestures
+    known: NDArray[np.bool_]  # (n,) whether the model would publish one of its gestures
 
     def taken(self, threshold: float, margin: float) -> NDArray[np.bool_]:
-        """(n,) which are answered with the new gesture."""
+        """(n,) whether a sample is answered with the new gesture."""
         return (self.own >= threshold) & (~self.known | (self.own - self.built_in >= margin))
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One person's new gesture after so many examples."""
+    """One person's new gesture after a number of examples."""
 
     kind: str
     examples: int
@@ -127,7 +127,7 @@ class Trial:
 
 
 def played_through(seen: Seen, final: Space | None = None) -> Iterator[Trial]:
-    """Every enrolment. Without `final` in spaces learned from other people and other kinds, five times two."""
+    """Every enrolment, in `final` or else in ten spaces, each learned from other people and other kinds."""
     plan, _ = seen.plans()
     people, kinds = np.unique(seen.people), np.unique(seen.kinds[plan])
     folds = np.array_split(np.random.default_rng(0).permutation(kinds), FOLDS)
@@ -150,7 +150,7 @@ def _trials(
     gestures = his & np.isin(seen.labels, seen.gestures)
     for kind in kinds:
         mine = np.flatnonzero(his & plan & (seen.kinds == kind))
-        if len(mine) < REPETITIONS - 2:  # it falls to pieces on this sensor
+        if len(mine) < REPETITIONS - 2:  # too few repetitions were cut out whole
             continue
         others = his & ~gestures & (seen.kinds != kind)
         for count in range(1, EXAMPLES + 1):
@@ -165,10 +165,10 @@ def _trials(
 
 
 def _without_thresholds(seen: Seen, chosen: NDArray[np.bool_]) -> Space:
-    """Mean, directions and variances of what was chosen."""
+    """The space of the chosen samples, without thresholds: mean, directions and variances."""
     plan, of = seen.plans()
     gestures = np.isin(seen.labels, seen.gestures)
-    # How far one person repeats himself: a plan, and a gesture that he makes now slowly, now fast, here or there.
+    # Variation within one person: of a plan, and of a gesture made slowly or fast, here or there.
     means, spread = _pooled(seen.embedding, of, plan & chosen)
     within = _shrunk((spread + _pooled(seen.embedding, of, gestures & chosen)[1]) / 2)
     middle = means.mean(axis=0)
@@ -186,7 +186,7 @@ def _without_thresholds(seen: Seen, chosen: NDArray[np.bool_]) -> Space:
 
 
 def _pooled(x: Array, of: NDArray[np.int64], chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """The means (G, E) of the groups `of` which a part was chosen, and the covariance (E, E) within them."""
+    """The means (G, E) of the groups `of` that have chosen samples, and the covariance (E, E) within them."""
     x, inverse = x[chosen], np.unique(of[chosen], return_inverse=True)[1]
     count = np.bincount(inverse)
     means = np.stack([np.bincount(inverse, column) for column in x.T], 1) / count[:, np.newaxis]
@@ -195,7 +195,7 @@ def _pooled(x: Array, of: NDArray[np.int64], chosen: NDArray[np.bool_]) -> tuple
 
 
 def _shrunk(covariance: Array) -> Array:
-    """Pooled from few people it says too much: towards its diagonal, and towards equal variances."""
+    """A covariance from few people, shrunk towards its diagonal and towards equal variances."""
     size = len(covariance)
     even = np.trace(covariance) / size * np.eye(size)
     return np.asarray((1.0 - DIAGONAL) * covariance + DIAGONAL * np.diag(np.diag(covariance)) + EVEN * even)
@@ -206,9 +206,9 @@ QUICK_PEOPLE = 3
 
 
 def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
-    """Learn the space of a model that has an embedding, and write it into its file, and its manifest anew.
+    """Learn the space of a model, write it into the model's file, and renew the manifest beside it.
 
-    Raises ModelError for a model without one.
+    Raises ModelError for a model without an embedding.
     """
     space = learn(Seen.by(embedding_of(path), played(cache, people, jobs)))
     figures_of = {model.stem: measured(model) for model in path.parent.glob("*.onnx")}  # the graph stays the same
@@ -227,7 +227,7 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
 
 
 def embedding_of(path: Path) -> Model:
-    """A model that can compare examples, whether or not its file is the one in the manifest; ModelError for others."""
+    """A model that can compare examples, whether or not the manifest has its file. Raises ModelError for others."""
     try:
         model = Model(read_bytes(path), path.stem)
     except ValueError as error:
