@@ -1,7 +1,7 @@
 """The operating points of a model: thresholds by strictness, and the curve of missed gestures against false ones.
 
-They are chosen on hours of simulated everyday life of people of whom no network knows. Gestures that are mirror images
-of one another share a threshold: the one at which right answers are worth most against wrong and false ones.
+They are chosen on hours of simulated everyday life of people from whom no network has learned. Gestures that are turned
+or mirrored images of one another share a threshold: the best balance of right, wrong and false answers.
 """
 
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ from gestured.lab.fit import CLASSES, targets
 from gestured.lab.samples import EVERYDAY, Samples
 from gestured.simulator import GESTURES, NONE
 
-# Lost gestures that one false gesture counts as much as, on a day on which some 35 gestures an hour are meant. A budget
-# of false ones alone would give up the taps, which are what everyday life most looks like.
+# Lost gestures that weigh as much as one false gesture, on a day with some 35 meant gestures an hour. A budget of false
+# ones alone would give up the taps, which everyday contact resembles most.
 COSTS = dict(zip(STRICTNESS, (0.1, 0.25, 3.0), strict=True))
 
 
 def operating_points(answers: Answers, lived: Samples, performed: int, hours: float) -> dict[str, Any]:
-    """The metadata `operating_points` by answers to (G,) segments of so many hours in which gestures were performed.
+    """The metadata `operating_points`, by answers to (G,) segments of so many `hours` with `performed` gestures.
 
     A gesture that was performed and never cut out is missed at every point.
     """
@@ -54,22 +54,23 @@ def operating_points(answers: Answers, lived: Samples, performed: int, hours: fl
 
 
 def _by_level(best: NDArray[np.int64], sure: NDArray[np.floating], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(G, L) how many of the chosen segments are named each gesture with at least each of LEVELS."""
+    """(G, L) by gesture, how many chosen segments are named so with a confidence of at least each of LEVELS."""
     counts = [(sure[chosen & (best == g)][:, None] >= np.array(LEVELS)).sum(axis=0) for g in range(len(GESTURES))]
     return np.array(counts, np.int64)
 
 
 def alike() -> list[list[int]]:
-    """(G,) for each gesture those that turns and mirrors make of it, itself among them.
+    """(G,) for each gesture the gestures that turns and mirrors make of it, with itself.
 
-    No direction is meant more often than another, so what told the thresholds of two directions apart would be chance.
+    No direction is meant more often than another, so a difference between the thresholds of two directions would be
+    chance.
     """
     table = symmetry_table(CLASSES)[:, : len(GESTURES)]
     return [sorted({int(k) for k in column if k < len(GESTURES)}) for column in table.T]
 
 
 def by_strictness(points: Mapping[str, Any]) -> str:
-    """What the points cost, a line each."""
+    """A line for each point: false gestures an hour, and the share missed."""
     return "\n".join(
         f"{name}: {points[name]['false_per_hour']:.2f} false an hour, {points[name]['missed']:.3f} missed"
         for name in STRICTNESS

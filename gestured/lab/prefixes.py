@@ -1,6 +1,6 @@
-"""Unfinished gestures: windows that end while the finger is still down, as the run time sees them.
+"""Unfinished gestures: windows that end while the finger is still down, as at run time.
 
-A prefix ends in a touched frame, and its peak is that of what came so far: nothing in it knows what follows.
+A prefix ends in a touched frame, and is scaled by its own peak: nothing in it depends on what follows.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from gestured.model.features import ACTIVE
 
 
 def askable(samples: Samples) -> NDArray[np.bool_]:
-    """(N,) whether each of the samples' frames is a touched one, at which the run time may ask what it will be.
+    """(N,) whether each frame of the samples is touched, so that a provisional answer may be asked for.
 
-    It lies between the first and the last touched frame, and is active by the peak so far.
+    Such a frame lies between the first and the last touched frame, and is active by the peak so far.
     """
     peaks = samples.frames.max(axis=(1, 2)).astype(np.float32) if len(samples.frames) else np.zeros(0, np.float32)
     found = np.zeros(len(peaks), bool)
@@ -42,9 +42,9 @@ def shortened(x: Tensor, lengths: Tensor, least: Tensor) -> Tensor:
 def drawn(
     index: NDArray[np.int64], samples: Samples, asked: NDArray[np.bool_], share: float, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """(B,) for each sample of `index` the length of a random prefix, or 0 where it stays whole.
+    """(B,) for each sample of `index` the length of a random prefix, or 0 if it stays whole.
 
-    `asked` is what `askable` gave. All lengths from the second touched frame on are as likely.
+    `asked` is what `askable` gave. All lengths from the second touched frame on are equally likely.
     """
     lengths = np.zeros(len(index), np.int64)
     for row in np.flatnonzero(rng.random(len(index)) < share):
@@ -56,7 +56,7 @@ def drawn(
 
 
 def prefixes(samples: Samples) -> tuple[Samples, NDArray[np.int64], NDArray[np.int64]]:
-    """All prefixes of the samples, in order; of which sample each is, and how many frames since its onset."""
+    """All prefixes of the samples, in order; the sample of each, and its number of frames since the onset."""
     asked, least = askable(samples), floors(samples)
     windows: list[NDArray[np.float16]] = []
     of: list[int] = []

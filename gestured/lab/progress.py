@@ -1,4 +1,4 @@
-"""A progress bar on standard error: a line that renews itself at a terminal, a line now and then elsewhere."""
+"""A progress bar on standard error: one line that is rewritten at a terminal, a new line now and then elsewhere."""
 
 import sys
 import time

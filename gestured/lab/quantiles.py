@@ -1,4 +1,4 @@
-"""What training data looked like, and how a model answered new people: a deployment is held against both."""
+"""Quantiles of training data and of a model's answers to new people, with which a deployment is compared."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 
 
 def quantiles(samples: Samples) -> dict[str, Any]:
-    """What the training gestures looked like, to compare a deployment with."""
+    """Quantiles of the training gestures' measures, to compare a deployment with."""
     known = samples.take(samples.labels != NONE)
     found = [measures(known.window(i), WINDOW.rate_hz) for i in range(len(known))]
     values = {"strength": known.strength} | {name: np.array([one[name] for one in found]) for name in MEASURES}
@@ -21,12 +21,12 @@ def quantiles(samples: Samples) -> dict[str, Any]:
 
 
 def _at(values: NDArray[np.floating]) -> list[float]:
-    """The values at `QUANTILES`, of which one number has at least four digits."""
+    """The values at `QUANTILES`, each rounded to five digits."""
     return [float(f"{value:.5g}") for value in np.quantile(values, QUANTILES)]
 
 
 def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
-    """How a model answers gestures of people whom it has not seen: confidence where it answers, and how often not."""
+    """A model's answers to gestures of people whom it has not seen: quantiles of confidence, and the share unknown."""
     given = confidence[known]
     answered = given[given >= least] if (given >= least).any() else given
     return {"confidence": _at(answered), "unknown": round(float((given < least).mean()), 4)}

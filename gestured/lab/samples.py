@@ -1,4 +1,4 @@
-"""Windows and what is known of them: what everything in the lab learns from, and is judged on."""
+"""Samples: windows and what is known of them, from which everything in the lab learns."""
 
 import hashlib
 from collections.abc import Iterable, Sequence
@@ -13,8 +13,8 @@ from gestured.core.window import Window
 from gestured.model.context import NAMES, context
 from gestured.model.features import touch_pattern
 
-EVERYDAY, LIKE_A_TAP, PART = "everyday", "like_a_tap", "part"  # kinds of what is cut out of everyday life
-# How every model sees a segment.
+EVERYDAY, LIKE_A_TAP, PART = "everyday", "like_a_tap", "part"  # kinds of segments that are cut out of everyday life
+# The window of every model.
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 
 
@@ -29,8 +29,8 @@ class Samples:
     people: NDArray[np.int64]  # (G,) participant or subject
     strength: NDArray[np.float64]  # (G,) peak in units of the sensor's noise
     first: NDArray[np.int64]  # (G,) index of the first touched frame in its window
-    last: NDArray[np.int64]  # (G,) and of the last one
-    context: NDArray[np.float32]  # (G, K) what surrounded each (`gestured.model.context`)
+    last: NDArray[np.int64]  # (G,) index of the last touched frame
+    context: NDArray[np.float32]  # (G, K) context of each (`gestured.model.context`)
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -40,7 +40,7 @@ class Samples:
         return self.frames[self.offsets[index] : self.offsets[index + 1]].astype(np.float32)
 
     def lengths(self) -> NDArray[np.int64]:
-        """(G,) frames of each."""
+        """(G,) number of frames of each window."""
         return np.diff(self.offsets)
 
     def features(self) -> NDArray[np.float32]:
@@ -54,7 +54,7 @@ class Samples:
         return Samples(*packed(parts), *(getattr(self, name)[index] for name in OF_EACH))
 
     def digest(self) -> str:
-        """The SHA-256 of all that the samples hold."""
+        """The SHA-256 of frames, offsets, labels, kinds and people; the other fields do not count."""
         total = hashlib.sha256()
         for array in (self.frames, self.offsets, self.labels.astype("U40"), self.kinds.astype("U40"), self.people):
             total.update(np.ascontiguousarray(array).tobytes())
@@ -65,7 +65,7 @@ OF_EACH = Samples.__slots__[2:]  # the fields (G,)
 
 
 def packed(windows: Sequence[NDArray[np.float16]]) -> tuple[NDArray[np.float16], NDArray[np.int64]]:
-    """Windows (T, R, C) one after the other, (N, R, C), and where each begins and the last one ends, (G + 1,)."""
+    """(N, R, C) frames of windows, one after the other, and (G + 1,) where each begins and the last one ends."""
     frames = np.concatenate(windows) if windows else np.zeros((0, WINDOW.rows, WINDOW.columns), np.float16)
     return frames, np.cumsum([0, *map(len, windows)], dtype=np.int64)
 
@@ -84,7 +84,7 @@ class Sample(NamedTuple):
 
 
 def sample(segment: Segment, label: str, kind: str, person: int, window: Window = WINDOW) -> Sample:
-    """What was cut, through a window."""
+    """The sample of a segment, seen through a window."""
     signed = window.signed(segment)
     frames = np.maximum(signed, 0.0).astype(np.float16)
     strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)

@@ -1,8 +1,7 @@
-"""People who do something of their own again and again, simulated.
+"""Simulated people who repeat gestures of their own.
 
-One performance is the plan; a repetition is the same path with what a hand changes from time to time: where, how large,
-how turned, how fast and how firmly, and a slow sway. Some plans are signs, letters and figures that somebody may choose
-and that no network has learned.
+One performance is the plan; a repetition is the same path with what a hand varies: place, size, rotation, speed, force,
+and a slow sway. Some plans are signs, letters and figures that somebody may choose and that no network has learned.
 """
 
 import math
@@ -58,7 +57,7 @@ SIGNS: dict[str, Corners] = {
     "bow": ((0.0, 1.0), (0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)),
 }
 LEARNED, JUDGED = tuple(SIGNS)[::2], tuple(SIGNS)[1::2]  # to learn thresholds from, and to judge them by
-LEG_S = 0.28  # for a leg as long as half of the pad
+LEG_S = 0.28  # s for a leg as long as half of the pad
 
 
 def sign(
@@ -85,23 +84,23 @@ def _made(corners: Corners, occasion: Occasion) -> list[Press]:
     return drawn(occasion, t, x, y)
 
 
-PLAN = "plan"  # label of a repetition; anything else that is done is labelled as everywhere
+PLAN = "plan"  # label of a repetition; other performances have their usual labels
 REPETITIONS = 9  # of a plan: five examples, and four to try them on
 # What lies or rubs on the sensor, and faults: nobody performs these on purpose.
 NOT_PERFORMED = (
     "palm", "heel_rest", "forearm", "wipe", "object_put_down", "sleeve_brush", "wrinkle", "electrical_burst", "spike",
 )  # fmt: skip
 PERFORMED = tuple(kind for kind in NON_GESTURES if kind not in NOT_PERFORMED)
-HARD = 3  # every third person's sensor is any at all, at half the hardness there is
-FIRST_PERSON = 500_000  # nobody else in the lab has these numbers
-GESTURE_TRIALS, OTHER_TRIALS = 4, 2  # of each kind, done in any way
+HARD = 3  # every third person has a random sensor, at half the greatest hardness
+FIRST_PERSON = 500_000  # people from here on occur nowhere else in the lab
+GESTURE_TRIALS, OTHER_TRIALS = 4, 2  # performances of each kind, in any manner
 
 
 def played(cache: Path, people: int, jobs: int = 2, *, judge: bool = False) -> Samples:
-    """What so many people do: repetitions of plans, the model's gestures, and everything else, person by person.
+    """Samples of so many people, one after the other: repetitions of plans, the model's gestures, and everything else.
 
     The plans are the kinds of non-gestures that somebody could perform, and signs that no network has learned; with
-    `judge` other people and other signs. From `cache` where it was made before.
+    `judge` other people and other signs. The samples come from `cache` if they were made before.
     """
     stream = f"own-{code_digest(__name__)[:8]}"
     STREAMS[stream] = _part
@@ -113,7 +112,7 @@ TO_LEARN, TO_JUDGE = 0, 1  # seeds
 
 
 def _part(seed: int, index: int) -> list[Sample]:
-    """One person's repetitions of one plan, or what else he does of one kind."""
+    """One person's repetitions of one plan, or that person's performances of one kind."""
     plans = PERFORMED + (JUDGED if seed == TO_JUDGE else LEARNED)
     kinds = plans + GESTURES + NON_GESTURES
     nth, part = divmod(index, len(kinds))
@@ -138,7 +137,7 @@ def _part(seed: int, index: int) -> list[Sample]:
 def _recorded(
     performance: Performance, sensor: SimulatedSensor, rng: np.random.Generator, label: str
 ) -> Iterator[Sample]:
-    """The one segment that is cut out of it; nothing where it falls into several, or is missed."""
+    """The segment that is cut out of a performance; nothing if there are several, or none."""
     take = recorded(performance, sensor, rng)
     found = list(matched(cuts(take.frames, take.times), truths(take)))
     if len(found) == 1:
@@ -146,7 +145,7 @@ def _recorded(
 
 
 def repeated(plan: Performance, rng: np.random.Generator, extent: tuple[float, float]) -> Performance:
-    """The same once more, by a hand that is no machine, on a pad of `extent` millimetres."""
+    """A repetition of a plan, as a hand varies it, on a pad of `extent` millimetres."""
     xs, ys = (np.concatenate([getattr(contact, axis) for contact in plan.contacts]) for axis in "xy")
     middle_x, middle_y, size = xs.mean(), ys.mean(), math.hypot(np.ptp(xs), np.ptp(ys))
     turn, tempo, force = rng.normal(0.0, math.radians(6.0)), rng.lognormal(0.0, 0.12), rng.lognormal(0.0, 0.2)

@@ -1,1 +1,1 @@
-"""Recordings of one's own: collected at a terminal, imported, looked at, forgotten. Needs numpy alone."""
+"""A user's own recordings: collected at a terminal, imported, checked, forgotten. Needs numpy alone."""

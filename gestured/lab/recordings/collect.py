@@ -1,6 +1,6 @@
-"""`gestured-lab collect` leads a participant through the protocol: prompt, countdown, gesture, verdict, key; again.
+"""`gestured-lab collect` leads a participant through the protocol: prompt, countdown, gesture, verdict, key.
 
-Every kept take is on disk before the next prompt, so a session can end at any moment and go on later.
+Every kept take is on disk before the next prompt, so a session can end at any moment and be continued later.
 """
 
 import argparse
@@ -29,8 +29,8 @@ from gestured.model.opening import open_model
 from gestured.record.arrays import read, write
 from gestured.record.recordings import Recordings
 
-GESTURE_TIMEOUT_S = 10.0  # for a gesture to begin, and for it to end
-APART_S = 0.4  # a second contact within so long belongs to the take (and spoils it)
+GESTURE_TIMEOUT_S = 10.0  # s for a gesture to begin, and then for it to end
+APART_S = 0.4  # s: a second contact within this time belongs to the take, and spoils it
 CONSENT = """\
 Consent of participant {participant}
   What is recorded: the pressure on the sensor while you perform gestures, and
@@ -41,15 +41,15 @@ Consent of participant {participant}
 WIDTH = 80  # columns of a terminal
 KEEP = "Enter keep  "
 KEYS = KEEP + "r repeat  d discard, it comes again  p pause  q quit, go on later"
-SURE = 0.9  # confidence of a model that contradicts
+SURE = 0.9  # confidence from which a model contradicts
 
 
 class Paused(Exception):
-    """Somebody asked for a pause; what was being captured is void."""
+    """Somebody asked for a pause; the take that was being captured is void."""
 
 
 class Session:
-    """One participant at one sensor; `kept` is what is on disk."""
+    """One participant at one sensor; `kept` holds the recordings on disk."""
 
     def __init__(
         self, participant: str, path: Path, kept: Recordings | None, sensor: LiveSensor, terminal: Terminal, wait_s: int
@@ -57,8 +57,8 @@ class Session:
         self.participant, self.path, self.kept = participant, path, kept
         self._sensor, self._terminal, self._wait_s = sensor, terminal, wait_s
         self._consent = ""
-        self.inclination: int | None = None  # how the sensor lies; None is not known
-        self.kind = ""  # of sensor, as recordings have it
+        self.inclination: int | None = None  # of the sensor; None if it is not known
+        self.kind = ""  # kind of sensor, as in recordings
 
     def run(self, trials: Sequence[Exercise]) -> None:
         """Ask for one trial after the other until all are kept, or somebody quits."""
@@ -77,7 +77,7 @@ class Session:
                 trial = todo.pop(0)
                 if take is not None:
                     self._keep(take, trial)
-                else:  # again before the sensor is moved
+                else:  # repeated before the sensor is moved
                     others = (k for k, other in enumerate(todo) if other.inclination != trial.inclination)
                     todo.insert(next(others, len(todo)), trial)
             say(f"All {total} are done. Thank you.")
@@ -105,7 +105,7 @@ class Session:
         self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.1f} Hz.")
 
     def _trial(self, trial: Exercise, number: int, total: int) -> Captured | None:
-        """The take to keep, or None where it was discarded."""
+        """The take to keep, or None if it was discarded."""
         say = self._terminal.say
         while True:
             try:
@@ -128,12 +128,12 @@ class Session:
                 return take
 
     def _once(self, trial: Exercise) -> tuple[str, Captured | None]:
-        """One performance: what was captured, and the key that judges it."""
+        """Capture one performance; returns the key that was pressed for it, and the take."""
         terminal, sensor = self._terminal, self._sensor
         for left_s in range(self._wait_s, 0, -1):
             terminal.say(f"{left_s} ", end="")
             self._until(None, 1.0)
-        if not self._free():  # or it was moved, and must be learned again
+        if not self._free():  # touched, or moved, so that it must be learned again
             terminal.say("do not touch the sensor ", end="")
             self._until(self._free)
         sensor.begin()
@@ -188,7 +188,7 @@ class Session:
     def _until(self, done: Callable[[], bool] | None, seconds: float = math.inf) -> str:
         """Feed the front end until `done` is true or `seconds` are over; returns "".
 
-        Without `done` and `seconds`, until a key is pressed, which is returned. Raises Paused and Ended for their keys.
+        Without `done` and `seconds` it waits for a key, and returns that. Raises Paused for the key p, and Ended for q.
         """
         end = time.monotonic() + seconds
         told = False
@@ -219,7 +219,7 @@ class Session:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Collect until all is done or somebody quits; the same command goes on."""
+    """Collect until all is done or somebody quits; the same command continues later."""
     terminal = PadTerminal() if args.pad else Terminal()
     args.out.mkdir(parents=True, exist_ok=True)
     path: Path = args.out / f"{args.participant}.npz"
@@ -247,7 +247,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def already(path: Path, participant: str, grid: tuple[int, int]) -> Recordings | None:
-    """What an earlier session kept; RecordingError where the file is somebody else's or another sensor's."""
+    """The recordings of an earlier session. Raises RecordingError if they are of another participant or grid."""
     if not path.exists():
         return None
     kept = read(path)

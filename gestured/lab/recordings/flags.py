@@ -16,7 +16,7 @@ from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 FOLDER = Path("recordings")
 SEED = number(0, 10**9, whole=True)
-NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
+NO_NAMES = (SESSION, UNNAMED)  # labels in recordings that name no gesture, besides those that `is_name` refuses
 IMPORT = """\
 Make recordings of CSV files. What cannot be used is told and
 counted: the file, the line, the field, and what was expected.
@@ -29,7 +29,7 @@ Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
 def add_recordings(command: Add) -> None:
-    """Add the three subcommands; `command` takes a name, what it does and an example."""
+    """Add the three subcommands; `command` takes a subcommand's name, its help and an example."""
     collect = command("collect", "lead a participant through the protocol, and record the sensor that sends over OSC",
                       "gestured-lab collect --participant 07 --listen 0.0.0.0:9000")  # fmt: skip
     collect.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
@@ -84,7 +84,7 @@ def _label(text: str) -> str:
 
 
 def _own(text: str) -> str:
-    """A gesture's name, or one of one's own; what is nearly a gesture's is a slip."""
+    """A gesture's name or an own name; a name that is nearly a gesture's counts as a typing error."""
     if text in GESTURES:
         return text
     meant = difflib.get_close_matches(text, GESTURES, n=1, cutoff=0.85)

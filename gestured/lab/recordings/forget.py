@@ -19,7 +19,7 @@ FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 
 
 def run(args: argparse.Namespace) -> int:
-    """Say what would go, ask, and let it go. Exit status 1 where a file could not be looked into, or stays."""
+    """Say what would be removed, ask, and remove it. Exit status 1 if a file could not be looked into, or stays."""
     name, unread = args.participant, []
     found: dict[Path, tuple[int, int]] = {}  # how many recordings are the participant's, and how many there are
     for file in _files(args.paths):
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     for file in found if done else ():
         try:
             _remove(file, name)
-        except (RecordingError, OSError) as error:  # a file that stays does not keep the others
+        except (RecordingError, OSError) as error:  # if a file stays, the others are still removed
             stay.append(str(error) if isinstance(error, RecordingError) else f"{file}: {error.strerror}")
             say(f"not removed: {stay[-1]}", to=sys.stderr)
     if args.json:
@@ -69,17 +69,17 @@ def _remove(file: Path, participant: str) -> None:
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
-    """The files, and those inside the folders, with what `write` leaves behind where the power goes."""
+    """The files, and those inside the folders, with temporary files that `write` leaves behind in a power failure."""
     for path in paths:
         if not path.exists():
             raise GesturedError(f"{path}: is not there; nothing was removed")
     inside = [[*path.rglob("*.npz"), *path.rglob(".*.npz.*")] if path.is_dir() else [path] for path in paths]
-    # A link is not what holds the recordings.
+    # Links are resolved, since a link does not hold the recordings.
     return list(dict.fromkeys(file.resolve() for some in inside for file in sorted(some)))
 
 
 def _whole(file: Path) -> None:
-    """RecordingError where a file holds what would not be written again."""
+    """Raise RecordingError if a file holds fields that would not be written again."""
     with zipfile.ZipFile(file) as archive:
         unknown = sorted(set(archive.namelist()) - FIELDS)
     if unknown:
@@ -87,7 +87,7 @@ def _whole(file: Path) -> None:
 
 
 def _learned(model: Path, participant: str) -> str:
-    """What a model says of a participant of this pseudonym."""
+    """What a model's file says of a participant of this pseudonym."""
     try:
         origins = said(model)
     except (ValueError, OSError) as error:

@@ -1,7 +1,7 @@
-"""`gestured-lab import`: CSV with one row a frame -> one file of recordings.
+"""`gestured-lab import`: CSV with one row for each frame -> one file of recordings.
 
-A line that is no frame is left out and told; its frame counts as lost, which the times show. Where that is more than
-half of a file, its form is another one, and the file is refused.
+A line that is no frame is left out and reported; the times show that a frame was lost. A file with more such lines than
+frames has another form, and is refused.
 """
 
 import argparse
@@ -26,17 +26,17 @@ from gestured.record.recordings import Recordings
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
-NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory
-BAD_LINES = 10_000  # lines of a file that are left out and named; with more it is no file of this kind
-LEFT_OUT_SHOWN = 10  # of the lines that were left out; the rest is counted
-LARGEST_COUNT = 1e30  # of any number; sums and differences of such counts still fit into a float32
+NUMBERS = 1 << 27  # numbers of all frames of a file: a gibibyte in memory
+BAD_LINES = 10_000  # lines of a file that may be left out and named; a file with more has another form
+LEFT_OUT_SHOWN = 10  # left-out lines that are printed; the rest is counted
+LARGEST_COUNT = 1e30  # the largest number; sums and differences of such counts still fit into a float32
 
 
 @dataclass(frozen=True, slots=True)
 class Csv:
-    """What a CSV file does not say itself.
+    """What is to be known of a CSV file beside its content.
 
-    It holds one recording, a row for each frame: time, then rows x columns values, row by row, the top row first;
+    A file holds one recording, a row for each frame: time, then rows x columns values, row by row, the top row first;
     commas between them, a heading or none.
     """
 
@@ -49,7 +49,7 @@ class Csv:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Import what can be; what cannot is told and counted. Nothing is written where nothing can be."""
+    """Import files; what cannot be used is reported and counted. Raises GesturedError if nothing can be written."""
     if args.out.exists():
         raise GesturedError(f"--out: {args.out} is there already; expected a new file")
     parts: list[Recordings] = []
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[tuple[int, str]]]:
-    """One recording, and each line that was left out with its reason; RecordingError where the file holds none."""
+    """One recording, and each left-out line with its reason. Raises RecordingError if the file holds no recording."""
     times: list[float] = []
     values = array("d")
     last: list[float] = []
@@ -114,7 +114,7 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[tuple[int, str]]]:
 
 
 def _marked(frames: NDArray[np.generic], times: NDArray[np.float64], path: Path, form: Csv) -> Recordings:
-    """One recording of (T, R, C) frames felt at (T,) s; of a gesture with its first and last touched frame."""
+    """One recording of (T, R, C) frames at (T,) s; that of a gesture has its first and last touched frame."""
     whole = Recordings(
         frames=frames,
         times=times - times[0],
@@ -133,7 +133,7 @@ def _marked(frames: NDArray[np.generic], times: NDArray[np.float64], path: Path,
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """The lines that are not empty, with their numbers from 1. RecordingError for one that no frame needs."""
+    """The lines that are not empty, with their numbers from 1. Raises RecordingError if one is too long."""
     try:
         with TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as file:
             for number in count(1):
@@ -156,7 +156,7 @@ def _number(cell: str) -> float | None:
 
 
 def _numbers(cells: list[str], count: int) -> list[float]:
-    """ValueError, with the field, for what is no frame."""
+    """The numbers of a row. Raises ValueError, which names the field, if it is no frame."""
     if len(cells) != count:
         raise ValueError(f"line: expected {count} numbers, found {len(cells)}")
     found = [_number(cell) for cell in cells]

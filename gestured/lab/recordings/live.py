@@ -1,4 +1,4 @@
-"""A real sensor over OSC/UDP, decoded, stamped and cut as the daemon does it; a take of what it felt."""
+"""A real sensor over OSC/UDP, decoded, stamped and cut as in the daemon, and takes of its frames."""
 
 import math
 import socket
@@ -36,9 +36,9 @@ WHY = {
 
 
 class LiveSensor:
-    """The first sensor that sends to `address`, or the one called `name`. Raises GesturedError where it cannot listen.
+    """The first sensor that sends to `address`, or the one called `name`. Raises GesturedError if it cannot listen.
 
-    `classifier` says what each take looks like. `pump` reads; what the hub found of it since `begin` is `found`.
+    `classifier` says what each take looks like. `pump` reads packets; `found` holds the events since `begin`.
     """
 
     def __init__(self, address: Address, grid: tuple[int, int], name: str | None, classifier: Classifier) -> None:
@@ -51,7 +51,7 @@ class LiveSensor:
         self._hub = Hub(Scene(classifier.gestures, grid, touches=True, frames=True), classifier)
         self._frames: deque[Frame] = deque()
         self._free = -math.inf  # s, when the last contact was over
-        self._before = -math.inf  # s, the same at `begin`
+        self._before = -math.inf  # s, `_free` at the last `begin`
         self._heard = time.monotonic()
         self._wrong = ""
         try:
@@ -74,7 +74,7 @@ class LiveSensor:
 
     @property
     def rate_hz(self) -> float:
-        """Frames a second as they came, 0 before it is known."""
+        """Frames a second as they arrive; 0 before this is known."""
         steps = np.diff([frame.t for frame in self._frames])
         return 1.0 / float(np.median(steps)) if len(steps) else 0.0
 
@@ -98,14 +98,14 @@ class LiveSensor:
         return self._hub.readings(time.monotonic()).get(self.name or "")
 
     def pump(self) -> None:
-        """Take what waits in the socket."""
+        """Process the packets that wait in the socket."""
         waiting: list[tuple[bytes, Source]] = []
         while True:
             try:
                 waiting.append(self.socket.recvfrom(PACKET_BYTES))
             except BlockingIOError:
                 break
-            except OSError:  # the network's complaint about something else; the socket goes on
+            except OSError:  # an error that the network reports about other packets; the socket still works
                 continue
         now = time.monotonic()
         for fact in [*self._hub.receive(waiting, now), *self._hub.tick(now)]:
@@ -135,13 +135,13 @@ class LiveSensor:
                 self._free = self.now
 
     def begin(self) -> None:
-        """Begin a take: what was felt before does not belong to it."""
+        """Begin a take; earlier contacts do not belong to it."""
         self.found = []
         self._before = self._free
 
     @property
     def onset(self) -> float | None:
-        """When the first contact since `begin` began."""
+        """When the first contact since `begin` began, in s; None without one."""
         return next((contact.onset for contact in self.found if isinstance(contact, Onset)), None)
 
     def quiet(self, seconds: float) -> bool:
@@ -150,7 +150,7 @@ class LiveSensor:
         return over and not self.touched and self.now - self._free >= seconds
 
     def take(self) -> Captured | None:
-        """What was felt since `begin`; None where nothing was."""
+        """The take since `begin`; None without a contact."""
         onset = self.onset
         if onset is None:
             return None

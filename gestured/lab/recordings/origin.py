@@ -1,4 +1,4 @@
-"""Whose recordings a model learned from: written into the model's metadata, and read again when somebody asks."""
+"""Whose recordings a model learned from: written into the model's metadata, and read from there."""
 
 import json
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ class Origin:
 
 
 def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
-    """What a model that learns from these files says of them; RecordingError for what is no recording."""
+    """The metadata `learned_from` about these files. Raises RecordingError for a file that holds no recordings."""
     return [asdict(_origin(path)) for path in paths]
 
 
@@ -39,7 +39,7 @@ def _origin(path: Path) -> Origin:
 
 
 def said(model: Path) -> list[Origin] | None:
-    """The recordings that a model says it learned from; None where it does not say. ValueError for no model."""
+    """The recordings that a model learned from; None if its file does not say. Raises ValueError for no model."""
     import onnx
     from google.protobuf.message import DecodeError
 

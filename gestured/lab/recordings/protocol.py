@@ -16,7 +16,7 @@ PSEUDONYM = re.compile(r"[A-Za-z0-9_-]{1,32}")
 
 
 class Exercise(NamedTuple):
-    """One thing to perform."""
+    """One trial: what to perform, and how."""
 
     gesture: str
     speed: str
@@ -25,7 +25,7 @@ class Exercise(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What a recording of it is called."""
+        """The label of a recording of the trial."""
         return NONE if self.none else self.gesture
 
     def __str__(self) -> str:
@@ -48,8 +48,8 @@ def order(
 ) -> list[Exercise]:
     """All trials in this participant's own order: the same for the same arguments.
 
-    Inclinations come in blocks, in random order, since whoever moves the sensor must hold it still for a while before
-    it can be used again. Within a block gestures and speeds are shuffled, each once before any comes again, and so are
+    Inclinations come in blocks, in random order, since a sensor that was moved must lie still for a while before it can
+    be used again. Within a block gestures and speeds are shuffled, each once before any comes again, and so are
     `others`, kinds of non-gestures, at one speed.
     """
     rng = np.random.default_rng([seed, *participant.encode()])
@@ -63,7 +63,7 @@ def order(
 
 
 def left(trials: Sequence[Exercise], kept: Recordings | None) -> list[Exercise]:
-    """What of `trials` is still to do, in order, when `kept` holds what was done before."""
+    """The `trials` that are still to be done, in order; `kept` holds earlier recordings."""
     done = Counter(_performed(kept)) if kept is not None else Counter()
     todo = []
     for trial in trials:
@@ -78,7 +78,7 @@ def _performed(kept: Recordings) -> list[Exercise]:
     if kept.speeds is None or kept.inclinations is None:
         return []
     kinds = kept.labels if kept.kinds is None else kept.kinds
-    # Beside recordings of which nobody knows how the sensor lay, the numbers stand as texts.
+    # In a file that also holds recordings of unknown inclination, the numbers are texts.
     inclinations = [int(n) if isinstance(n, str) and n.isdecimal() else n for n in kept.inclinations.tolist()]
     fields = (kept.labels.tolist(), kinds.tolist(), kept.speeds.tolist(), inclinations)
     return [

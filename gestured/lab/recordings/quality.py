@@ -1,4 +1,4 @@
-"""Whether a captured take is fit to learn from: what a person at the sensor can still put right."""
+"""Whether a captured take is fit to learn from: faults that a person at the sensor can still correct."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from gestured.core.frames import Frame
 
 STROKE_FRAMES = 3  # fewer touched frames show no movement; a tap needs one
-GAP = 1.6  # times the usual step between two frames; from there on one was lost between them: 1.5 and some jitter
+GAP = 1.6  # times the usual step between two frames; a longer step has lost a frame (1.5, and some jitter)
 RAIL_FRAMES = 3  # frames with a taxel at exactly the contact's largest count, fewer of which are chance
-RAIL_SHARE = 0.3  # of a contact's frames with such a taxel
+RAIL_SHARE = 0.3  # least share of a contact's frames with such a taxel
 RAIL_TAXELS = 3  # taxels of one frame at exactly the largest count; so many are cut off whatever the other frames show
 FINEST = 50  # steps between least and largest count; a sensor with fewer shows the same count again by chance
 
@@ -32,12 +32,12 @@ class Captured:
         return np.array([frame.values for frame in self.frames], np.float64)
 
     def times(self) -> NDArray[np.float64]:
-        """When each frame was felt, (T,) s."""
+        """The time of each frame, (T,) s."""
         return np.array([frame.t for frame in self.frames])
 
     @property
     def seconds(self) -> float:
-        """How long it was touched: a frame stands for the time to the next one."""
+        """Seconds of touch, in which a frame stands for the time to the next one."""
         times = self.times()
         return float(times[self.release] - times[self.onset] + np.median(np.diff(times)))
 
@@ -48,7 +48,7 @@ class Captured:
 
 
 def faults(take: Captured, gesture: str) -> list[str]:
-    """What is wrong with a take of `gesture`; empty where nothing is."""
+    """What is wrong with a take of `gesture`; empty if nothing is."""
     found = [take.trouble] if take.trouble else []
     contact = slice(take.onset, take.release + 1)
     count = take.release - take.onset + 1
@@ -81,8 +81,8 @@ def gaps(times: NDArray[np.float64]) -> NDArray[np.int64]:
 def saturated(contact: NDArray[np.floating]) -> bool:
     """Whether the pressure of a contact (T, R, C) in counts was cut off at the top.
 
-    Under a finger counts tremble, and at the end of their range they stand still. A contact with fewer than `FINEST`
-    steps of counts is never called cut off.
+    Counts under a finger vary, and at the end of their range they stand still. A contact with fewer than `FINEST` steps
+    of counts is never called cut off.
     """
     top = contact.max()
     if top - contact.min() < FINEST:

@@ -1,4 +1,4 @@
-"""Recordings in the contract's form: of one take, or sets put together; and what the front end marks in them."""
+"""Recordings in the contract's form: of one take, or sets put together; and the touched frames of a gesture."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -14,13 +14,13 @@ from gestured.lab.recordings.quality import Captured
 from gestured.record.check import EVENT_FIELDS
 from gestured.record.recordings import FINGERS, Recordings, touch_arrays
 
-TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
+TOGETHER = ("onsets", "releases")  # fields that are left out if one set lacks them
 
 
 def join_recordings(parts: Sequence[Recordings]) -> Recordings:
-    """Several sets as one, in that order; RecordingError where their grids differ.
+    """Several sets as one, in that order. Raises RecordingError if their grids differ.
 
-    What one set does not know of its recordings is empty there (NaN for touches).
+    A field that one set lacks is empty for its recordings (NaN for touches).
     """
     grids = {part.frames.shape[1:] for part in parts}
     if len(grids) != 1:
@@ -72,8 +72,8 @@ def compact(frames: NDArray[Any]) -> NDArray[Any]:
 def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int] | None:
     """The first and the last touched frame of one gesture (T, R, C) at `times` (T,) s, as the front end sees them.
 
-    None where it does not see exactly one. A recording that is touched too early for the front end to learn the idle
-    sensor gets idle frames of its own before it, as for training; without any, nothing can be told.
+    None if the front end does not see exactly one gesture. A recording that is touched too early for it to learn the
+    idle sensor is extended by idle frames of its own, as for training; without any, the result is None.
     """
     rise = (frames - np.quantile(frames, 0.25, axis=0)).max(axis=(1, 2))
     strong = np.flatnonzero(rise >= 0.3 * rise.max())

@@ -1,4 +1,4 @@
-"""A terminal that gives single keys, and is left as it was found; and one that shows the same on a pad's page."""
+"""A terminal that gives single keys and is restored at the end, and one that shows the same on a pad's page."""
 
 import os
 import queue
@@ -18,13 +18,13 @@ from gestured.core.errors import GesturedError
 
 
 class Ended(Exception):
-    """The terminal was closed, or the system asks to end."""
+    """The session ends: somebody quits, the terminal was closed, or the system asks to end."""
 
 
 class Terminal:
-    """Standard input and output as a context manager; raises GesturedError where they are no terminal.
+    """Standard input and output as a context manager; raises GesturedError if they are no terminal.
 
-    However the block is left (a key, an error, Ctrl-C, SIGTERM, SIGHUP), the terminal is as before.
+    The terminal is restored however the block is left (a key, an error, Ctrl-C, SIGTERM, SIGHUP).
     """
 
     def __init__(self) -> None:
@@ -41,17 +41,17 @@ class Terminal:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
-        with suppress(termios.error):  # it has gone
+        with suppress(termios.error):  # the terminal has gone
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
     def fileno(self) -> int:
-        """To wait for a key with `select`."""
+        """The file descriptor, to wait for a key with `select`."""
         return self._fd
 
     def key(self) -> str | None:
-        r"""A key that was pressed, in lower case ("\n" for Enter), None where there is none.
+        r"""A key that was pressed, in lower case ("\n" for Enter), None if there is none.
 
-        Raises Ended where there is no terminal any more.
+        Raises Ended if there is no terminal any more.
         """
         if not select.select([self._fd], [], [], 0)[0]:
             return None
@@ -74,7 +74,7 @@ class Terminal:
             tty.setcbreak(self._fd)
 
     def say(self, text: str, end: str = "\n") -> None:
-        """Print; what is foreign in it went through `shown`."""
+        """Print; text that somebody else chose must have gone through `shown`."""
         say_drawn(text, end)
 
     def _end(self, number: int, frame: FrameType | None) -> None:
@@ -84,7 +84,7 @@ class Terminal:
 RATE_HZ = 15.0  # the models' own
 KIND = "touchscreen"  # of sensor, in recordings
 NON_GESTURES = ("diagonal_swipe", "check_mark", "zigzag", "scribble", "spiral", "back_and_forth", "pinch", "rubbing")
-KEYS = ("\n", "r", "d", "y", "p")  # that the page may press; quitting is the terminal's
+KEYS = ("\n", "r", "d", "y", "p")  # keys that the page may press; only the terminal can quit
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -96,20 +96,20 @@ class PadTerminal(Terminal):
         self._pressed: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def join(self, server: PadServer) -> None:
-        """The page of `server` belongs to it from now on; its address is printed."""
+        """Connect the page of `server`, and print its address."""
         self._server = server
         server.press = self._press
         say(server.page)
         invite(server)
 
     def key(self) -> str | None:
-        """A key that was pressed here or there."""
+        """A key that was pressed at the terminal or on the page; None if there is none."""
         with suppress(queue.Empty):
             return self._pressed.get_nowait()
         return super().key()
 
     def say(self, text: str, end: str = "\n") -> None:
-        """Print, here and there."""
+        """Print at the terminal and on the page."""
         super().say(text, end)
         self._server.say(COLOUR.sub("", text) + end)
 
