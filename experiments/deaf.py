@@ -43,7 +43,7 @@ class Bad:
     begins_s: float
     lasts_s: float
     frames: Change
-    stays: bool = False  # the level stays where the last bad frame had it
+    stays: bool = False  # the level stays as the last bad frame had it
 
     def stream(self, frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
         """The sensor's stream with its bad frames."""

@@ -1,7 +1,7 @@
 """Several instances on one machine, one of which is killed: what the others lose, and when its sensors are back.
 
-`python -m experiments.fleet --instances 4 --sensors 1000 --rate 15` prints it as JSON. Each sensor is untouched, has
-a port of its own, sends steadily, and counts its frames. The killed instance is started again, as by systemd.
+`python -m experiments.fleet --instances 4 --sensors 1000 --rate 15` prints it as JSON. Each sensor is untouched, has a
+port of its own, sends steadily, and counts its frames. The killed instance is started again, as by systemd.
 """
 
 import argparse

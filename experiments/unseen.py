@@ -125,7 +125,7 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
     """How non-gestures are rejected of which a network, its second opinion and its calibration have seen none.
 
     Beside it are the figures of heads and calibration alone without these kinds, and of the model in `path`, which
-    knows them, each with its shares of the gestures. The training is kept in `cache`, as every other.
+    knows them, each with its shares of the gestures. The training is kept in `cache`.
     """
     classes = untaught(group_of(WHOLE))
     print(f"{NAME} and {len(classes)} kinds of non-gestures: {', '.join(CLASSES[k] for k in classes)}", flush=True)

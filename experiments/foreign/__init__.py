@@ -47,10 +47,10 @@ def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: fl
 def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
     """One gesture or non-gesture on a 9 x 9 sheet at about 15 Hz.
 
-    Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`,
-    `onset` and `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in
-    each frame; a touch below about 4 cannot be seen. `contacts` are the times (s) of each finger's contact. The
-    sheet is idle for at least 1.3 s before and after.
+    Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`, `onset` and
+    `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in each frame; a touch
+    below about 4 cannot be seen. `contacts` are the times (s) of each finger's contact. The sheet is idle for at least
+    1.3 s before and after.
     """
     return _take(kind, seed, level, 9, 9, 15.0)
 

@@ -52,8 +52,8 @@ def turned(x: Tensor, symmetry: int) -> Tensor:
 def varied(x: Tensor, generator: torch.Generator) -> Tensor:
     """(B, T, R, C) windows -> windows as another sensor, hand or network would have given them.
 
-    Small rotation, scale and shift; gain of single taxels; response curve; crosstalk along rows and columns;
-    blur; noise; a lost frame bridged from its neighbours, as `Window` does. The peak stays as it was.
+    Small rotation, scale and shift; gain of single taxels; response curve; crosstalk along rows and columns; blur;
+    noise; a lost frame bridged from its neighbours, as `Window` does. The peak stays as it was.
     """
     batch, time = x.shape[:2]
 

@@ -76,8 +76,8 @@ class Facts:
 def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
-    `forward` returns (scores (B, G), unknown (B,)), and perhaps an embedding (B, E). B and T stay open.
-    Raises ModelError if the file's outputs differ from torch's by more than `PARITY`, or a check fails.
+    `forward` returns (scores (B, G), unknown (B,)), and perhaps an embedding (B, E). B and T stay open. Raises
+    ModelError if the file's outputs differ from torch's by more than `PARITY`, or a check fails.
     """
     module = module.eval()
     rows, columns = facts.window.rows, facts.window.columns
@@ -117,8 +117,8 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
 def export_forest(forest: RandomForestClassifier, path: Path, facts: Facts, features: Sequence[str]) -> None:
     """Write a random forest over `features`; its classes are 0 .. G-1 for the gestures, the others for none.
 
-    The outputs are those of `forest_outputs`. Raises ModelError if the file's differ from the forest's own by more
-    than `PARITY`, or a check fails.
+    The outputs are those of `forest_outputs`. Raises ModelError if the file's differ from the forest's own by more than
+    `PARITY`, or a check fails.
     """
     count = len(facts.gestures)
     if not np.array_equal(forest.classes_, np.arange(len(forest.classes_))) or len(forest.classes_) < count:

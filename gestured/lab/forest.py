@@ -180,7 +180,7 @@ def grow_forest(
 ) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
     """The touch-pattern forest of the paper's Table IV (depth 9), with a class for non-gestures.
 
-    It has 100 trees, half of the paper's: the file is half as large, and answers unknown people as well. Returns what
+    It has 100 trees, half of the paper's: the file is half as large, and as good on unknown people. Returns what
     `train.judged` returns: the forest, its calibration, and figures of its answers to people that it has not seen.
     """
     samples = teach if real is None else join([teach, real])

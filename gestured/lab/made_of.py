@@ -21,8 +21,8 @@ LINE = re.compile(
     r"<!-- made by `([^`]+)`(?: of ((?:\S+ [0-9a-f]{12}(?:, )?)+))?"
     r"(?:; code (?P<code>[0-9a-f]{12})(?: of (?P<modules>[\w. ]+))?)?(?:; block [0-9a-f]{12})? -->"
 )
-# DECIDES decide which gesture a sensor's frames become. CARRIES carry frames, open files and describe answers; they are
-# set aside, since they change often, but no decision.
+# DECIDES: modules that decide which gesture a sensor's frames become. CARRIES: modules that carry frames, open files or
+# describe answers; they are set aside, since they change often, and change no decision.
 DECIDES = ("gestured.core.sensor", "gestured.model.model")
 CARRIES = frozenset((
     "gestured.core.address", "gestured.core.events", "gestured.core.osc", "gestured.core.owner", "gestured.core.wire",

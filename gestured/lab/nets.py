@@ -154,9 +154,9 @@ class Perceptron(Standardising):
 class Decision(nn.Module):
     """Combines two opinions into calibrated scores and the probability of no gesture.
 
-    `first` and `second` give logits over G gestures and further classes of non-gestures. The scores are a
-    softmax over the weighted sum of both (temperature scaling of each, Guo et al. 2017). The rejection is a
-    logistic regression on both opinions' log-odds of no gesture, on how far they agree and on how sure they are.
+    `first` and `second` give logits over G gestures and further classes of non-gestures. The scores are a softmax over
+    the weighted sum of both (temperature scaling of each, Guo et al. 2017). The rejection is a logistic regression on
+    both opinions' log-odds of no gesture, on how far they agree and on how sure they are.
     """
 
     CUES = 6

@@ -1,9 +1,9 @@
-"""The shipped models from nothing: simulate, learn, calibrate, export. Each step is kept, so a run can go on later.
+"""The shipped models from nothing: simulate, learn, calibrate, export. Each step is kept, so a run can be continued.
 
-Who is who (participants never cross): the cohort's participants 0 to 23 teach, 24 to 27 calibrate, 28 to 33 test;
-the wide stream's seeds 1, 2 and 3 do the same, each with people of its own; from those of its seed 4 the thresholds
-of provisional events are learned. Real subjects calibrate and test only networks that have not seen them: three
-folds, which share what was learned from simulation.
+The split (no participant is in two parts): the cohort's participants 0 to 23 teach, 24 to 27 calibrate, 28 to 33 test;
+the wide stream's seeds 1, 2 and 3 do the same, each with people of its own; its seed 4 is for the thresholds of
+provisional events. Real subjects calibrate and test only networks that have not seen them: three folds, which share
+what was learned from simulation.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ MIXED = REAL_SETS[1]  # the one that has non-gestures, too
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
 COHORT = 1_000_000  # the wide stream's people have larger numbers
-OWN = 100_000  # people of one's own recordings have larger numbers than the public subjects
+OWN = 100_000  # people of own recordings have larger numbers than the public subjects
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +64,8 @@ class TrainingPlan:
     forest: int = 20_000  # simulated samples for the forest
     days: int = 700  # of everyday life, twelve minutes of a person each
     days_calibrate: int = 1_000  # days to learn the verifier from
-    chance: int = 700  # days as chance draws them, to learn from
-    chance_calibrate: int = 1_000  # the same for the verifier
+    chance: int = 700  # days by `simulator.chance`, to learn from
+    chance_calibrate: int = 1_000  # such days to learn the verifier from
     days_points: int = 400  # days on the nominal sensor to choose the operating points by
     fit: FitConfig = field(default_factory=FitConfig)
 
@@ -98,16 +98,16 @@ class TrainingData:
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
     real: Samples | None
-    real_judged: int = 0  # of them, the first ones: cut gestures, whose touches the sessions behind them hold again
-    lived: Samples | None = None  # everyday life of people of whom no network knows; None: no verifier
-    spoken: Samples | None = None  # the same of further people, on the nominal sensor: operating points are of them
+    real_judged: int = 0  # number of those that judge, the first ones: cut gestures, whose touches sessions hold again
+    lived: Samples | None = None  # everyday life of people from whom no network learned; None: no verifier
+    spoken: Samples | None = None  # everyday life of further people on the nominal sensor, for operating points
 
 
 def load_data(
     plan: TrainingPlan, cache: Path, real: Path | None, jobs: int, recordings: Sequence[Path] = ()
 ) -> TrainingData:
-    """Simulate, or take from the cache, and read the real recordings in their folder, and those of one's own."""
-    found = _real(real, recordings)  # first, so that a wrong file is told of before anything is simulated
+    """Simulate, or read from the cache; also read the real recordings in their folder, and own recordings."""
+    found = _real(real, recordings)  # first, so that a wrong file is reported before anything is simulated
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
         for seed, count in ((1, plan.wide), (2, plan.wide_calibrate), (3, plan.wide_check))
@@ -143,7 +143,7 @@ def load_data(
 def _real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int] | None:
     """All real samples, and how many of them, the first ones, are of the file of cut gestures.
 
-    Recordings of one's own stand at the end; where there are no others, they are what is judged.
+    Own recordings stand at the end; if there are no others, own recordings are judged.
     """
     parts = [recorded(read(path)) for path in _real_files(folder)]
     if recordings:
@@ -159,7 +159,7 @@ def _real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int
 
 
 def _performed(folder: Path | None) -> dict[str, int]:
-    """Labelled gestures in the file of cut gestures, cut out again by the front end or not, by the set that judges."""
+    """By judging set, how many gestures the file of cut gestures holds, cut out again by the front end or not."""
     paths = _real_files(folder)
     labels = read(paths[0]).labels.astype(str) if paths else np.zeros(0, str)
     return {title: int((is_of(labels, title) & np.isin(labels, GESTURES)).sum()) for title in REAL_SETS}
@@ -172,28 +172,28 @@ def is_of(labels: NDArray[np.str_], title: str) -> NDArray[np.bool_]:
 
 
 def _real_files(folder: Path | None) -> list[Path]:
-    """The real recordings, where their folder was named."""
+    """The files of real recordings; none without their folder."""
     return [folder / name for name in REAL_FILES] if folder else []
 
 
 def folds(real: Samples) -> list[NDArray[np.bool_]]:
-    """Which samples each fold holds out: every subject once."""
+    """For each fold, whether a sample is held out (N,); every subject is held out once."""
     subjects = np.unique(real.people)
     return [np.isin(real.people, subjects[k::FOLDS]) for k in range(FOLDS)]
 
 
 @dataclass(slots=True)
 class Trained:
-    """The networks, and what those that had not seen them say of the real subjects."""
+    """The networks, and the logits for real subjects of networks that have not seen them."""
 
     nets: nn.ModuleDict
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
-    folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
-    start: nn.ModuleDict | None = None  # those that had not seen any real recording; None where these are `nets`
+    folds: list[nn.ModuleDict] = field(default_factory=list)  # of each of `folds`: networks without its subjects
+    start: nn.ModuleDict | None = None  # networks before any real recording; None if these are `nets`
     _kept: dict[tuple[str, str], Evidence] = field(default_factory=dict)
 
     def evidence(self, name: str, samples: Samples) -> Evidence:
-        """What a network, and the trajectory net beside it, make of samples; each set is asked about once."""
+        """The evidence of a network and the trajectory net on samples, computed once for each set."""
         key = name, samples.digest()
         if key not in self._kept:
             self._kept[key] = Evidence.of(self.nets, name, samples)
@@ -201,7 +201,7 @@ class Trained:
 
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:
-    """Both stages and the folds of these networks; what is done already is read from the cache."""
+    """Both stages and the folds of these networks; what is finished is read from the cache."""
     told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest(), names])
     key = hashlib.sha256(told.encode()).hexdigest()[:12]
     checkpoint = cache / f"checkpoint-{key}.npz"
@@ -235,7 +235,7 @@ class Calibrated:
 
 
 def calibration_set(trained: Trained, data: TrainingData) -> Calibrated:
-    """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
+    """Logits for people that no network has seen: simulated ones, and real ones by the fold that left them out."""
     found, labels = logits(trained.nets, data.calibrate), targets(data.calibrate)
     sets = (data.calibrate.people < COHORT).astype(np.int64)
     if data.real is not None and trained.held_out is not None:
@@ -248,7 +248,7 @@ def calibration_set(trained: Trained, data: TrainingData) -> Calibrated:
 
 
 def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, jobs: int) -> Foretold:
-    """What networks that have not seen them say of the calibration people, and of further ones, before the end."""
+    """Answers before the end of networks that have not seen the calibration people, further ones and real subjects."""
     further = simulated(cache, "wide", 4, plan.wide_early, jobs)
     alone = [data.calibrate, further]
     if data.lived is not None:
@@ -262,9 +262,9 @@ def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Pa
 def judged(
     trained: Trained, name: str, calibrated: Calibrated, data: TrainingData | None = None
 ) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
-    """A network with its second opinion, their calibration, and how it answers then (`answer_figures`).
+    """A network with its second opinion, their calibration, and figures of its answers (`answer_figures`).
 
-    With `data` that holds everyday life they have a verifier, too, and the threshold is of answers that it has seen.
+    If `data` holds everyday life, there is a verifier, too, and the threshold is fitted on answers after it.
     """
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
@@ -286,7 +286,7 @@ def judged(
 def measured_points(
     trained: Trained, module: Judged, name: str, data: TrainingData, plan: TrainingPlan
 ) -> dict[str, Any]:
-    """The metadata `operating_points` of a network with a verifier, on hours of people of whom it knows nothing."""
+    """The metadata `operating_points` of a network with a verifier, on hours of people from whom it has not learned."""
     assert data.spoken is not None
     assert module.verifier is not None
     answers = trained.evidence(name, data.spoken).answers(module.decision, module.verifier)

@@ -1,9 +1,9 @@
 """Trajectory features of a window, computed inside the network's graph, and the net that judges by them.
 
 Where the contact went (centroid path at equal distances, as in the $1 recogniser of Wobbrock et al. 2007), how it
-turned (winding, signed area), how straight and how fast it was, how wide it was (second moments), how many
-fingers there were (local maxima) and how many contacts. They see what a recurrent net does not, and reject other
-things: a second opinion.
+turned (winding, signed area), how straight and how fast it was, how wide it was (second moments), how many fingers
+there were (local maxima) and how many contacts. They hold what a recurrent net does not see, and reject other contacts:
+a second opinion.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,15 @@ MAXIMUM = 0.2  # of the peak: lower local maxima are no fingers
 
 # The series of a frame, and what is found from frame to frame, in the order in which they stand in a tensor.
 X, Y, TOTAL, AREA, MAXIMA, PEAK, XX, YY, XY, MAJOR, MINOR, STEP, SLOW, SEVERAL, ONES = range(15)
-# Weights of frames: how hard, at both ends and in each half; all, of the first contact, of later ones; by quarters.
+# Weights of frames: by peak, of all frames, at both ends and in each half; evenly, of all frames, of the first contact,
+# of later ones, of each quarter and of each half.
 HARD, BEGIN, END, EARLY_HARD, LATE_HARD, ALL, FIRST, LATER, QUARTERS, EARLY, LATE = (*range(9), 12, 13)
 SPREAD = ((HARD, X), (HARD, Y), (HARD, MAJOR), (ALL, AREA), (ALL, PEAK), (ALL, TOTAL))
 MEANS = (
     (HARD, X), (HARD, Y), (HARD, XX), (HARD, YY), (HARD, XY), (HARD, MAJOR), (HARD, MINOR),
     (ALL, AREA), (ALL, PEAK), (ALL, SLOW), (ALL, MAXIMA), (ALL, SEVERAL), (EARLY, SEVERAL), (LATE, SEVERAL),
 )  # fmt: skip
-# Where each single feature is found, in the order that weights of all model files since version 0.2 expect.
+# The place of each single feature, in the order that weights of all model files since version 0.2 expect.
 ORDER = [
     0, 1, 5, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 38, 39, 15, 16, 32, 23, 24, 17, 19, 21, 22, 18, 20, 33, 47, 34,
     35, 36, 28, 29, 25, 26, 27, 40, 44, 48, 30, 45, 41, 31, 42, 37, 43, 46, 49, 50, 51, 52, 53,
@@ -40,7 +41,7 @@ BY_QUARTER = tuple((QUARTERS + k, value) for value in (PEAK, X, Y, STEP) for k i
 
 
 def _basis(rows: int, columns: int, dtype: torch.dtype) -> Tensor:
-    """(R * C, 6) by which taxels are weighed for total, x, y, xx, yy and xy; x to the right, y upward, -1 to 1."""
+    """(R * C, 6) weights of taxels for total, x, y, xx, yy and xy; x to the right, y upward, -1 to 1."""
     at_y, at_x = torch.linspace(1.0, -1.0, rows, dtype=dtype), torch.linspace(-1.0, 1.0, columns, dtype=dtype)
     y, x = torch.meshgrid(at_y, at_x, indexing="ij")
     return torch.stack([torch.ones_like(x), x, y, x * x, y * y, x * y], 2).flatten(0, 1)
@@ -63,9 +64,9 @@ def per_frame(x: Tensor) -> Tensor:
 
 
 def mean_blob(x: Tensor, place: Tensor, weight: Tensor) -> Tensor:
-    """(B, T, R, C) -> (B, PATCH * PATCH): the contact, its frames centred and averaged: finger, two, palm.
+    """(B, T, R, C) -> (B, PATCH * PATCH): the mean of centred frames, which tells a finger, two fingers or a palm.
 
-    `place` (B, 2, T) is each frame's centroid, `weight` (B, 1, T) what the frame counts.
+    `place` (B, 2, T) is the centroid of each frame, `weight` (B, 1, T) its weight.
     """
     rows, columns = int(x.shape[2]), int(x.shape[3])
     offset = torch.arange(PATCH, dtype=x.dtype)[:, None] - PATCH // 2
@@ -81,8 +82,8 @@ def mean_blob(x: Tensor, place: Tensor, weight: Tensor) -> Tensor:
 def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     """(B, T, R, C) windows -> (B, F) features; of the idle frames at the end only the first counts.
 
-    `lengths` (B,) as in `nets`. A graph of hundreds of small nodes takes most of its time for what is around them. So
-    series (B, n, T) stand together wherever they are treated alike, and no dimension is dropped before the end.
+    `lengths` (B,) as in `nets`. A graph of hundreds of small nodes spends most of its time between the nodes. So series
+    (B, n, T) are kept together as long as they are treated alike, and no dimension is dropped before the end.
     """
     time = x.shape[1]
     index = torch.arange(time, dtype=x.dtype)
@@ -92,7 +93,7 @@ def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     last, first = (active * index).amax(2), time - (active * (time - index)).amax(2)  # (B, 1)
     end = read_at(x, lengths)[:, None]
     over = (end.to(x.dtype) > last).to(x.dtype)
-    after = peak.gather(2, end[:, None])[:, 0]  # what is still pressed there: little where the gesture is over
+    after = peak.gather(2, end[:, None])[:, 0]  # activity there: little if the gesture is over
     blob = mean_blob(x, place, active * peak)
     duration, n = (last - first + 1).clamp(min=0), active.sum(2)
     rise = active * (1 - _before(active))  # a contact begins
@@ -144,7 +145,7 @@ def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     a, b = torch.stack([towards - way, before], 2), torch.stack([towards, way], 2)  # (B, 2, 2, T): x and y first
     crossed, dot = a * b.flip(1), (a * b).sum(1)
     cross = crossed[:, 0] - crossed[:, 1]
-    sense = (dot > 0) | (cross.abs() > 1e-3 * dot.abs())  # half a turn has none
+    sense = (dot > 0) | (cross.abs() > 1e-3 * dot.abs())  # half a turn has no sense
     winds = (step > 0.02) & (active > 0) & sense[:, :1]
     turns = (step > 0.04) & (before.square().sum(1, keepdim=True) > 0.0016)
     counted = torch.cat([winds, turns], 1).to(x.dtype)
@@ -172,17 +173,17 @@ def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
 
 
 def _picked(means: Tensor, pairs: Sequence[tuple[int, int]]) -> Tensor:
-    """(B, 14, 15) -> (B, n): those by these weights of these values."""
+    """(B, 14, 15) means -> (B, n): those of the given pairs of weight and value."""
     return means.flatten(1)[:, [weight * (ONES + 1) + value for weight, value in pairs]]
 
 
 def _before(v: Tensor) -> Tensor:
-    """(..., T) -> the same one frame later, 0 first."""
+    """(..., T) -> the values of the frame before, 0 first."""
     return F.pad(v, (1, -1))
 
 
 def _angle(y: Tensor, x: Tensor) -> Tensor:
-    """atan2, kept away from the places where ONNX has no answer or another one: y = 0 and the origin."""
+    """atan2, kept away from arguments for which ONNX has no answer or another one: y = 0 and the origin."""
     still = x * x + y * y < 1e-12
     return torch.atan2(torch.where(still | (y == 0), 1e-9, y), torch.where(still, 1.0, x))
 

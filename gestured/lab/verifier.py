@@ -1,8 +1,8 @@
-"""The verifier: a last look at a segment and at what surrounded it, which says whether a gesture was meant.
+"""The verifier: decides from a segment and its context whether a gesture was meant.
 
-It sees what both networks remember of the segment, what they say, and its context. It learns on people of whom the
-networks know nothing, and its context alone from sessions in which gestures and everyday life are mixed: a take of one
-performance is given the past of some segment of such a session, so that nothing can be learned of takes by their past.
+Its inputs are the states and answers of both networks, and the context of the segment. It learns from people from whom
+the networks have not learned. It learns about context only from sessions in which gestures and everyday life are mixed:
+a take of one performance is given the past of some segment of such a session, so that its own past teaches nothing.
 """
 
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ from gestured.simulator import NONE
 EPOCHS = 30
 BATCH = 256
 RATE, DECAY = 2e-3, 3e-2
-EVERYDAY_COST = 1.0  # what all that nobody meant in everyday life counts, beside 1 for all gestures together
-OTHERS_COST = 0.5  # and all non-gestures that were performed one by one
+EVERYDAY_COST = 1.0  # weight of all that nobody meant in everyday life, beside 1 for all gestures
+OTHERS_COST = 0.5  # weight of all non-gestures that were performed one by one
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a network, and the trajectory net beside it, make of G samples."""
+    """The outputs of a network and of the trajectory net for G samples, with their context."""
 
     first: Tensor  # (G, K) logits of the network
     second: Tensor  # (G, K) of the trajectory net
@@ -38,7 +38,7 @@ class Evidence:
 
     @classmethod
     def of(cls, nets: nn.ModuleDict, name: str, samples: Samples) -> "Evidence":
-        """Ask both networks."""
+        """The evidence of both networks on samples."""
         net, trajectory = nets[name], nets["trajectory"]
         assert isinstance(net, Opinion)
         assert isinstance(trajectory, Opinion)
@@ -52,20 +52,20 @@ class Evidence:
         return cls(first, second, embedding, torch.from_numpy(samples.context))
 
     def beside(self, context: NDArray[np.float32]) -> "Evidence":
-        """The same segments in other surroundings, (G, C)."""
+        """The same evidence with another context (G, C)."""
         return replace(self, context=torch.from_numpy(context))
 
     @classmethod
     def join(cls, parts: "Sequence[Evidence]") -> "Evidence":
-        """What was made of several sets, one after the other."""
+        """The evidence on several sets, one after the other."""
         return cls(*(torch.cat([getattr(part, name) for part in parts]) for name in cls.__slots__))
 
     def take(self, chosen: Tensor) -> "Evidence":
-        """Of the chosen segments, a mask or indices."""
+        """The evidence on the chosen segments, a mask or indices."""
         return Evidence(*(getattr(self, name)[chosen] for name in self.__slots__))
 
     def answers(self, decision: Decision, verifier: Verifier | None) -> Answers:
-        """What both say together, after the verifier if there is one."""
+        """The joint answers of both networks, after the verifier if there is one."""
         if verifier is None:
             return decided(decision, self.first, self.second)
         with torch.no_grad():
@@ -92,9 +92,9 @@ def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.floa
 
 
 def fit_verifier(decision: Decision, parts: Sequence[tuple[Evidence, NDArray[np.int64]]], seed: int) -> Verifier:
-    """Learn from parts of (evidence, what each of its segments teaches, as `taught` says).
+    """Fit a verifier to parts of (evidence, class of each segment as `taught` gives it).
 
-    Each of the three counts as a whole, however many there are of it.
+    Each of the three classes has its weight as a whole, however many segments it has.
     """
     y = torch.from_numpy(np.concatenate([kind for _, kind in parts]))
     with torch.no_grad():

@@ -1,4 +1,4 @@
-"""What anybody may read, such as reports, pages, models and what is kept: written at once or not at all."""
+"""Files that anybody may read, such as reports, pages, models and caches: written whole or not at all."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from gestured.record.files import PUBLIC, atomic_write
 
 @contextmanager
 def replaced(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
-    """What is written takes the place of a file. OSError, as of a full disk, names the file, which is as it was."""
+    """Replace a file by what is written. An OSError, such as of a full disk, names the file and leaves it as it was."""
     try:
         with atomic_write(path, PUBLIC, durable=durable) as file:
             yield file
@@ -19,6 +19,6 @@ def replaced(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
 
 
 def write(path: Path, content: str | bytes, *, durable: bool = True) -> None:
-    """Put a content into the place of a file, as `replaced` does."""
+    """Replace a file by `content`, as `replaced` does."""
     with replaced(path, durable=durable) as file:
         file.write(content.encode() if isinstance(content, str) else content)

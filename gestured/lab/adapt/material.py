@@ -173,7 +173,7 @@ def _sittings(found: Recordings) -> list[Recordings]:
 
 
 def _cut(part: Recordings, path: Path) -> Samples:
-    """Windows of one sitting; a gesture that nobody has marked is marked as the front end sees it."""
+    """Windows of one sitting; gestures without marks are marked by the front end."""
     if part.labels[0] != SESSION and (part.onsets is None or part.releases is None):
         marks = [touched(part.frames_of(i), part.times_of(i)) for i in range(len(part))]
         seen = np.array([mark is not None for mark in marks])

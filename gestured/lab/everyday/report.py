@@ -85,7 +85,7 @@ def _share(value: float | None) -> str:
 
 
 def not_right(row: Mapping[str, float | None]) -> float | None:
-    """The share of the gestures meant that were missed or taken for another one; None where none was meant."""
+    """The share of the gestures meant that were missed or taken for another one; None if none was meant."""
     return None if row["missed"] is None or row["wrong"] is None else row["missed"] + row["wrong"]
 
 

@@ -16,7 +16,7 @@ from gestured.lab.table import Table
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 
-TABLES: Mapping[str, Callable[[bool], Table]] = {  # by their marks in a page; each is quick or whole
+TABLES: Mapping[str, Callable[[bool], Table]] = {  # by their marks in a page; the argument is whether to be quick
     "filters": filters_table,
     "extremes": lambda quick: whole_path_table(open_model(LADDER[0]), quick),
     "stiff": lambda quick: stiff_table(open_model(LADDER[0]), quick),
@@ -24,7 +24,7 @@ TABLES: Mapping[str, Callable[[bool], Table]] = {  # by their marks in a page; e
     "models": lambda quick: decisions_table(LADDER, quick),
 }
 
-# Tables that no model has a part in, and the code that they measure.
+# Tables without models, and the modules that they measure.
 WITHOUT_MODELS = {"filters": ("gestured.lab.stability.filters",), "day": ("gestured.core.front_end",)}
 
 
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         table = make(args.quick)
         done.append(asdict(table))
         if not args.json:
-            with suppress(BrokenPipeError):  # the page is written without a reader, too
+            with suppress(BrokenPipeError):  # the page is written even if nobody reads the output
                 say_drawn(str(table))
         if args.document:
             code = WITHOUT_MODELS.get(name)

@@ -34,14 +34,14 @@ LONGEST = 80  # frames: no front end gives more at 15 Hz, and the reference take
 
 
 class GatherElements(OpRun):  # type: ignore[misc, unused-ignore]
-    """onnx's own (1.23) bears 64 elements at most."""
+    """GatherElements for the reference, since that of onnx (1.23) takes 64 elements at most."""
 
     def _run(self, data: NDArray[Any], indices: NDArray[Any], axis: int) -> tuple[NDArray[Any]]:
         return (np.take_along_axis(data, indices, axis),)
 
 
 class Pad(OpRun):  # type: ignore[misc, unused-ignore]
-    """onnx's own cannot take elements away, as many as a negative number says. Zeros are put there, nothing else."""
+    """Pad for the reference, since that of onnx cannot remove elements for negative pads. It pads with zeros alone."""
 
     def _run(self, data: NDArray[Any], pads: NDArray[Any], *_: object, mode: str = "constant") -> tuple[NDArray[Any]]:
         ends = list(zip(pads[: data.ndim].tolist(), pads[data.ndim :].tolist(), strict=True))
@@ -90,7 +90,7 @@ def segment_cases(quick: bool) -> Iterator[Segment]:
 
 
 def extreme_windows(quick: bool) -> Windows:
-    """The windows of segments that no sensor should give, one of each that are the same; every fifth if quick."""
+    """The windows of segments that no sensor should give, without duplicates; every fifth if quick."""
     made = (WINDOW.apply(segment) for segment in segment_cases(quick))
     kept = {window.tobytes(): window for window in made if 0 < len(window) <= LONGEST}
     return list(kept.values())[:: 5 if quick else 1]
@@ -113,7 +113,7 @@ def decisions_table(names: Sequence[str], quick: bool) -> Table:
     rows: list[tuple[Value, ...]] = []
     for name in names:
         data = shipped()[name].read_bytes()
-        model = Model(data, name)  # also sees to it that onnxruntime is imported without its telemetry
+        model = Model(data, name)  # this also imports onnxruntime without its telemetry
         reference = by_reference(data)
         for title, some in sets.items():
             right = answers(reference, name, some)
@@ -135,7 +135,7 @@ def decisions_table(names: Sequence[str], quick: bool) -> Table:
 
 
 def by_reference(data: bytes) -> Run:
-    """The graph in float64; where it takes what surrounds a window, too, nothing is out of the way."""
+    """Run the graph in float64; if it takes a context, that is the one of `calm`."""
     runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements, Pad])
     first, *others = runner.input_names
 
@@ -170,13 +170,13 @@ def widened(data: bytes) -> onnx.ModelProto:
 
 
 def answers(run: Run, name: str, windows: Windows) -> Answers:
-    """What is said of each window by itself; the forest is given its features."""
+    """Answers to each window by itself; the forest is given the window's features."""
     inputs = windows if name in RECURRENT else [touch_pattern(window, WINDOW.rate_hz) for window in windows]
     scores, unknown = zip(*(run(one[np.newaxis])[:2] for one in inputs), strict=True)
     return np.concatenate(scores), np.concatenate(unknown)
 
 
 def difference(found: Answers, right: Answers, model: Model) -> tuple[int, float]:
-    """(windows whose published answer is another one, largest change of any score)."""
+    """(number of windows whose published answer differs, largest change of any score)."""
     changed = published(found, model.threshold) != published(right, model.threshold)
     return int(changed.sum()), max(float(np.abs(one - two).max()) for one, two in zip(found, right, strict=True))

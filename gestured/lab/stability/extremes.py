@@ -1,4 +1,4 @@
-"""What no sensor should send, through the very code that the daemon runs: does anything not finite come out?
+"""Input that no sensor should send, through the code that the daemon runs: whether all that comes out is finite.
 
 The whole path in one process (frames, front end, window, model, events) is given streams of a finger that swipes to the
 right. Every warning counts as a fault.
@@ -46,7 +46,7 @@ def simulated_series(count: int, kinds: Sequence[str] = GESTURES, seed: int = 41
 
 
 def events(stream: Series, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
-    """What a recogniser makes of it, by the front door."""
+    """The events that a recogniser, as `gestured.open` makes it, gives for a stream."""
     mounted = {"stability": Setup(mounting=mounting or Mounting())}
     scene = Scene(classifier.gestures, stream.frames.shape[1:], mounted)
     recogniser, found = Embedded(Sensor("stability", scene, classifier), classifier.gestures), []
@@ -56,7 +56,7 @@ def events(stream: Series, classifier: Classifier, mounting: Mounting | None = N
 
 
 def labels(found: list[Event]) -> tuple[str, ...]:
-    """What was answered, in order: a gesture, `unknown`, or why it was cancelled."""
+    """The answers, in order: a gesture, `unknown`, or why a contact was cancelled."""
     return tuple(
         event.gesture if isinstance(event, Gesture) else "unknown" if isinstance(event, Unknown) else event.reason
         for event in found
@@ -65,7 +65,7 @@ def labels(found: list[Event]) -> tuple[str, ...]:
 
 
 def fault(found: list[Event]) -> str:
-    """What breaks the contract in it: each onset has one answer and one release, all numbers are finite; else ''."""
+    """What breaks the contract (one answer and one release for each onset, finite numbers); '' if nothing does."""
     order = [event for event in found if not isinstance(event, Release)]
     releases = [event.id for event in found if isinstance(event, Release)]
     onsets = [event.id for event in found if isinstance(event, Onset)]
@@ -99,13 +99,13 @@ def swipes(
     return Series(times, frames), tuple(1.5 + 3.7 * k for k in range(count))
 
 
-FOUND = "swipe_right"  # what all swipes of `swipes` are
+FOUND = "swipe_right"  # the gesture of all swipes of `swipes`
 LEAST_GRID = 3  # on 2 x 2 taxels a swipe is two taps
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A stream, and the times (s) of the swipes of which each must be found; `alone`: and nothing else."""
+    """A stream, and the times (s) of swipes that must be found; with `alone` there must be no other answer."""
 
     family: str
     stream: Series
@@ -195,7 +195,7 @@ def _held(count: int) -> Series:
 
 
 def swipes_found(case: Case, classifier: Classifier) -> tuple[int, str]:
-    """(how many of the swipes were found, what is wrong otherwise)."""
+    """(number of swipes found, any other fault)."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

@@ -1,4 +1,4 @@
-"""The first-order filters of the core, run as they stand there and held against 50 digits.
+"""The first-order filters of the core, compared with exact results of 50 digits.
 
 Each follows dy/dt = (x - y) / tau for an input that is held between two frames, so that the exact answer is
 y + (x - y) (1 - exp(-dt / tau)) from one frame to the next. Times may repeat, and lie a day apart.
@@ -26,7 +26,7 @@ DAY_S = 86_400.0
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """A filter of the code: where it stands, and how it is run."""
+    """A filter of the core: its constants, and how it is run."""
 
     name: str
     tau_s: float
@@ -34,7 +34,7 @@ class Filter:
     start: float = 0.0  # its output at 0 s
     least_s: float = 0.0  # it does not step by less than this ...
     most_s: float = math.inf  # ... nor by more
-    over_s: float = math.inf  # after this it is nothing, by decision
+    over_s: float = math.inf  # after this its output is 0, by decision
     driven: bool = True  # whether it follows an input, or decays whatever comes
 
 
@@ -102,8 +102,8 @@ def exact(of: Filter, times: Array, inputs: Array) -> Array:
 def steps(count: int, decade: float | None, tau_s: float) -> Array:
     """(count,) times in s.
 
-    At one decade of dt / tau, uneven by half; or (None) of every size: from 1e-9 to 1e9 tau in disorder, some of them 0
-    (a repeated time), some a day.
+    Their steps are of one decade of dt / tau, uneven by half; or (None) of every size: from 1e-9 to 1e9 tau in
+    disorder, some of them 0 (a repeated time), some a day.
     """
     rng = np.random.default_rng([7, count])
     if decade is not None:

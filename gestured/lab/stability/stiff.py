@@ -1,7 +1,7 @@
-"""Stiff and extreme sessions: what slow ramps, hum, creep, coarse clocks and long days do to what is decided.
+"""Stiff and extreme sessions: how slow ramps, hum, creep, coarse clocks and long days change decisions.
 
-Whole simulated sessions, gestures and non-gestures, are bent in one way each and pass through the daemon's own path;
-and a whole day, with what a front end holds at its end.
+Whole simulated sessions of gestures and non-gestures are bent in one way each, and pass through the daemon's own path.
+A whole day shows what a front end holds at its end.
 """
 
 import hashlib
@@ -29,13 +29,13 @@ from gestured.simulator import GESTURES, Participant, SimulatedSensor, Take, ges
 from gestured.simulator.people import generator
 
 DAY_S, HOUR_S = 86_400.0, 3600.0
-FIRST = 8_000_000  # of the people; no model learned from them
+FIRST = 8_000_000  # first person; no model has learned from these people
 SHOWN = 16  # digits of a SHA-256
 RUNS = ("the first run", "the second")
 
 
 def day(quick: bool) -> Stretch:
-    """A day at 15 Hz (quick: twenty minutes) whose temperature swings by fifty noise units, every ten a gesture."""
+    """A day at 15 Hz (20 minutes if quick): its temperature swings by 50 noise units; a gesture every ten minutes."""
     sensor, rng = SimulatedSensor.nominal(day=FIRST), generator(FIRST, 0xDA4)
     noise, contacts = sensor.gain * sensor.noise, 2 if quick else 6 * 24
     takes = [gesture_take(name, Participant(FIRST + k), sensor, rng) for k, name in enumerate(GESTURES)]
@@ -58,7 +58,7 @@ def day(quick: bool) -> Stretch:
 
 
 def day_table(quick: bool) -> Table:
-    """The same day twice through a front end: how much it holds, and whether it holds the same to the last bit."""
+    """The same day twice through a front end: the size of its state, and whether the states are equal."""
     whole, part, every_s = ("20 minutes", "ten minutes", HOUR_S / 6) if quick else ("24 hours", "an hour", HOUR_S)
     most = f"most, after any {part.split()[-1]}"
     return Table(
@@ -86,18 +86,18 @@ def _run(life: Stretch, every_s: float) -> tuple[Value, ...]:
 SESSION_S, PEOPLE = 120.0, 10
 OTHERS = 0.25  # share of non-gestures in what is performed
 EPOCH_S = 1.7e9  # of the sensors' clocks at a session's start
-Bend = Callable[[Take, float], Take]  # a session and its noise in counts -> what becomes of it
+Bend = Callable[[Take, float], Take]  # a session and its noise in counts -> the session, bent
 Clock = Callable[[Array], Array]  # true times -> what the sensor's clock shows, in s
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One way to bend a session: its frames, or when and with what counter they seem to come."""
+    """One way to bend a session: by its frames, its sensor, its clock or its counter."""
 
     title: str
     bend: Bend = lambda take, noise: take
     sensor: Callable[[SimulatedSensor], SimulatedSensor] = lambda sensor: sensor
-    clock: Clock | None = None  # its tags rule; None: the arrivals do
+    clock: Clock | None = None  # its time tags are used; None: the arrivals are
     counter: int = 0  # of the first frame
 
 
@@ -111,7 +111,7 @@ def _warming(units: float) -> Bend:
 
 
 def _hum(hz: float, strength: float) -> Bend:
-    """Mains as a scan at 15 Hz sees it, row after row."""
+    """Mains hum as a scan at 15 Hz shows it, row after row."""
 
     def bend(take: Take, noise: float) -> Take:
         row = np.arange(take.frames.shape[1]) / take.frames.shape[1]
@@ -122,7 +122,7 @@ def _hum(hz: float, strength: float) -> Bend:
 
 
 def _arm(creeps: bool) -> Bend:
-    """Something as wide as an arm lies on the edge from the tenth second on; its answer creeps by a decade's third."""
+    """Something as wide as an arm lies on the edge from 10 s on; if it creeps, by a third of its counts each decade."""
 
     def bend(take: Take, noise: float) -> Take:
         rows, columns = take.frames.shape[1:]
@@ -135,7 +135,7 @@ def _arm(creeps: bool) -> Bend:
 
 
 def _pulsing(period_s: float) -> Bend:
-    """What is touched swings between its tenth and itself: activity and scale follow with 0.4 s and 2 s."""
+    """Counts of touches swing between a tenth and all of themselves."""
 
     def bend(take: Take, noise: float) -> Take:
         frames = _counts(take)
@@ -155,7 +155,7 @@ def _stepping(leap_s: float) -> Clock:
 
 
 def cases() -> Iterator[Case]:
-    """All of them; the first is a session as it is."""
+    """All cases; the first is a session as it is."""
     yield Case("as it is")
     for ramp in (1.0, 3.0, 10.0):
         yield Case(f"a cabin warms: {ramp:g} noise units a second", _warming(ramp))
@@ -208,7 +208,7 @@ def _stretch(case: Case, person: int) -> Stretch:
     take = session(Participant(person), sensor, generator(person, 0x57F), SESSION_S, OTHERS)
     take = case.bend(take, sensor.gain * sensor.noise)
     frames = list(map(Frame, take.times.tolist(), take.frames)) if case.clock is None else list(_stamped(case, take))
-    # The judge compares times of the stream, and a clock that steps takes the stream's time along.
+    # The judge compares times of the stream, which a clock that steps shifts.
     felt = take.times if case.clock is None else np.array([frame.t for frame in frames])
     acts = [act for act in take.events if act.label != NONE]
     times = [np.interp((act.onset_s, act.offset_s), take.times, felt).tolist() for act in acts]

@@ -1,4 +1,4 @@
-"""Checkpoints and the schedule: what is computed is not computed again, on one machine or on a cluster.
+"""Checkpoints and the schedule: each result is computed only once, on one machine or on a cluster.
 
 A cell's file is named by a digest of the code that shapes it, its data and its task; it is written by the process
 that collects the results, so that workers on other machines need no common folder.
@@ -24,7 +24,7 @@ from gestured.lab.written import write
 
 @dataclass(frozen=True)
 class Schedule:
-    """Where work is done and kept."""
+    """Where results are computed and kept."""
 
     cache: Path
     jobs: int
@@ -35,9 +35,9 @@ class Schedule:
         return self._path(task.method, run.__module__, [data.key, asdict(task)])
 
     def once(self, name: str, module: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:
-        """What `make` gives, from its file where it was made before.
+        """The result of `make`, from its file if it was made before.
 
-        It depends on the code of `module` and of all that this uses, and on `key`.
+        The file is named by `key`, and by the code of `module` and of all that it uses.
         """
         path = self._path(name, module, key)
         found = _read(path) if path.exists() else None
@@ -51,7 +51,7 @@ class Schedule:
         return self.cache / "cells" / f"{name}-{hashlib.sha256(told.encode()).hexdigest()[:20]}.json"
 
     def results(self, tasks: Sequence[Task], sets: Mapping[str, Data], title: str) -> dict[Task, Result]:
-        """Every task's result, from its file where it was computed before."""
+        """Every task's result, from its file if it was computed before."""
         paths = {task: self.path(task, sets[task.data]) for task in tasks}
         done = {task: _read(path) for task, path in paths.items() if path.exists()}
         found = {task: result for task, result in done.items() if result is not None}
@@ -72,7 +72,7 @@ def compute(task: Task, data: Data) -> tuple[Task, Result]:
 
 
 def _here(todo: Sequence[Task], sets: Mapping[str, Data], jobs: int) -> Iterator[tuple[Task, Result]]:
-    """Compute in joblib's own processes. GesturedError where one is killed."""
+    """Compute in joblib's own processes. Raises GesturedError if one is killed."""
     calls = (delayed(compute)(task, sets[task.data]) for task in todo)
     try:
         with parallel_config(backend="loky", inner_max_num_threads=1):
@@ -85,9 +85,9 @@ def _here(todo: Sequence[Task], sets: Mapping[str, Data], jobs: int) -> Iterator
 
 
 def _there(todo: Sequence[Task], sets: Mapping[str, Data], cluster: str) -> Iterator[tuple[Task, Result]]:
-    """Compute on Dask's workers behind a scheduler's address. GesturedError where that cannot be done.
+    """Compute on Dask's workers behind a scheduler's address. Raises GesturedError if it cannot.
 
-    Not by joblib's backend, which waits for ever for the result of a worker that was killed.
+    Joblib's backend for Dask is not used, since it waits for ever for the result of a worker that was killed.
     """
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
@@ -115,7 +115,7 @@ def keep(path: Path, result: Any) -> None:
 
 
 def _read(path: Path) -> Result | None:
-    """A checkpoint; None where the file is damaged, so that it is computed again."""
+    """A checkpoint; None if the file is damaged, so that it is computed again."""
     try:
         found: Result = json.loads(path.read_text())
     except ValueError:

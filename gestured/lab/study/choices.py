@@ -1,12 +1,12 @@
-"""Hyperparameters, and what the paper leaves open: our choice, others that it could be, and what it matters.
+"""Hyperparameters, and what the paper leaves open: our choice, its alternatives, and how much it matters.
 
 Hyperparameters are compared by cross-validation with participants left out, on people who are not judged anywhere else
 (`cohort.TUNING_SEED`); the paper compares them on those whom it judges. The grids are coarse and small. Networks are
 compared after fewer batches than they are trained for afterwards. What wins without augmentation is used with it too,
-which the paper does not (its Table IV has two columns).
+unlike in the paper (its Table IV has two columns).
 
-Each choice is varied alone, the rest as in the tuned setting; participants held out and no augmentation, except where
-it belongs to the paper's protocol (its length of all windows, the bounding box of its Algorithm 1).
+Each choice is varied alone, the rest as in the tuned setting; participants held out and no augmentation, except if it
+belongs to the paper's protocol (its length of all windows, the bounding box of its Algorithm 1).
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,7 +39,7 @@ LENGTHS = {0.5: "median", 0.9: "90th percentile", 1.0: "longest"}
 
 @dataclass(frozen=True)
 class Choice:
-    """One thing left open, and a task for each alternative."""
+    """One choice that the paper leaves open, and a task for each alternative."""
 
     choice: str
     ours: str
@@ -111,7 +111,7 @@ def _frames(count: int) -> str:
 def choices(
     plan: Plan, tuned: Mapping[str, Values], cohort: Cohort, sets: Mapping[str, Data], schedule: Schedule
 ) -> list[dict[str, Any]]:
-    """The section of study.json."""
+    """The section `choices` of study.json."""
     asked = list(wanted_choices(plan, tuned))
     tasks = [one for choice in asked for one in choice.tasks.values()]
     found = schedule.results(tasks, {**sets, **variants(cohort)}, "open choices")
@@ -128,7 +128,7 @@ TUNING = "tuning"  # the name of the data
 
 
 def tune(plan: Plan, people: Data | None, schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
-    """The best hyperparameters of each method on `people`, and every candidate's figures; the first ones without."""
+    """The best hyperparameters of each method on `people`, and all candidates' figures; without people the first."""
     if people is None:
         return {method.id: method.grid[0] for method in METHODS.values()}, []
     asked: dict[tuple[str, int], tuple[Values, Task]] = {}

@@ -1,8 +1,8 @@
 """The simulated cohort of 3060 as the study needs it: each gesture's segment, its window, and who did what and how.
 
-Every trial goes through the front end that the daemon runs. A trial whose gesture was not cut out is lost and
-counted; where several segments hold parts of it, the one that holds most of it stands for it. Beside it
-stand recordings that it does not hold: the public development recordings, and those that judge alone.
+Every trial goes through the front end that the daemon runs. A trial whose gesture was not cut out is lost and counted;
+if several segments hold parts of it, the one that holds most of it stands for it. Beside the cohort there are other
+recordings: the public development recordings, and those that only judge.
 """
 
 import hashlib
@@ -84,7 +84,7 @@ def _cut(seed: int, index: int) -> Segment | None:
 
 
 def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int, seed: int = SEED) -> Cohort:
-    """A cohort's gestures of these trials, from `cache` where they were made before."""
+    """A cohort's gestures of these trials, from `cache` if they were made before."""
     key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
     path = cache / f"study-cohort-{seed}-{len(trials)}-{key[:12]}.npz"
     fields = load(path)
@@ -112,7 +112,7 @@ REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no tex
 def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, Any]] | None:
     """Gestures of the real development recordings (at most `of_each` a subject) and what they are; None without them.
 
-    Only the file of cut gestures: the whole sessions hold the same touches again.
+    Only the file of cut gestures is read: the whole sessions hold the same touches again.
     """
     if folder is None:
         return None
@@ -131,7 +131,7 @@ def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, A
 
 
 def judges(path: Path) -> tuple[Samples, dict[str, Any]]:
-    """Gestures of a file that judge every method and teach none, and how many were performed and cut out."""
+    """Gestures of a file that judge every method and teach none, and their figures. Raises GesturedError for none."""
     found = read(path)
     performed = int(np.isin(found.labels, GESTURES).sum())
     samples = recorded(found.take(np.flatnonzero(np.isin(found.labels, GESTURES))))

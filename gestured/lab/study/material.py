@@ -12,31 +12,31 @@ from gestured.simulator import GESTURES
 
 UNCHANGED, SHIFT = "none", "shift"
 AUGMENTATIONS = (UNCHANGED, SHIFT)
-JUDGE = -1  # stands for a gesture's index: of other people, who judge alone
+JUDGE = -1  # stands for a gesture's index in samples that only judge
 THRESHOLD = 0.2  # of the gesture's peak
 EDGES = ("top", "bottom", "left", "right")
 
 
 @dataclass(frozen=True)
 class Data:
-    """A set of gestures. Two are equal where their keys are, so that a process prepares each once."""
+    """A set of gestures. Two are equal if their keys are, so that a process prepares each once."""
 
-    key: str  # a digest of all of it
+    key: str  # a digest of all samples
     name: str = field(compare=False)  # simulated, real or foreign
     gestures: Samples = field(compare=False)
     judges: Samples | None = field(compare=False, default=None)  # of another generator: they judge and teach nothing
 
     @classmethod
     def of(cls, name: str, gestures: Samples, judges: Samples | None = None) -> "Data":
-        """With the key that belongs to it."""
+        """A set with the key of its samples."""
         return cls(gestures.digest()[:16] + (judges.digest()[:8] if judges else ""), name, gestures, judges)
 
 
 @dataclass(frozen=True)
 class Form:
-    """What is done to all windows before anything else: nothing, unless told."""
+    """What is done to all windows before anything else; by default nothing."""
 
-    frames: int = 0  # each is cut, or followed by zeros, to so many; 0: each keeps its own
+    frames: int = 0  # length to which each is cut, or followed by zeros; 0: each keeps its own
     average: int = 1  # frames of a running average, after which a window has its peak at 1 again
 
 
@@ -82,7 +82,7 @@ def averaged(samples: Samples, count: int) -> Samples:
 
 
 def bounding_box(window: NDArray[np.floating], threshold: float = THRESHOLD) -> tuple[int, int, int, int]:
-    """(T, R, C) -> first row, last row, first column, last column that were pressed; all of it where none was."""
+    """(T, R, C) -> first row, last row, first column, last column that were pressed; all if none was."""
     rows, columns = window.shape[1:]
     pressed = window.max(axis=0) > threshold * window.max()
     if not pressed.any():
@@ -124,12 +124,12 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
     """The paper's augmentation, Algorithm 1: each gesture again at the edges of the sensor.
 
     The bounding box of a gesture holds every taxel that was pressed in any of its frames. The whole gesture is moved up
-    until its box touches the top edge, and again for the bottom, the left and the right edge: four copies of each.
-    Where the box touches an edge already the shift is zero and the copy is the gesture itself. The paper neither says
-    so nor leaves such copies out; we keep them and count them.
+    until its box touches the top edge, and again for the bottom, the left and the right edge: four copies of each. If
+    the box touches an edge already, the shift is zero and the copy is the gesture itself. The paper neither mentions
+    such copies nor leaves them out; we keep them and count them.
 
-    Left open by the paper: from which pressure on a taxel belongs to the box. Ours is `THRESHOLD` of the gesture's
-    peak. With a threshold of zero, noise fills the frame and every copy is the gesture itself.
+    The paper leaves open from which pressure on a taxel belongs to the box. Ours is `THRESHOLD` of the gesture's peak.
+    With a threshold of zero, noise fills the frame and every copy is the gesture itself.
     """
     count, edges = len(samples), len(EDGES)
     frames = np.zeros((edges, *samples.frames.shape), samples.frames.dtype)
@@ -151,7 +151,7 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
 
 @lru_cache(maxsize=4)
 def pool(data: Data, augmentation: str, form: Form = NO_FORM, box: float = THRESHOLD) -> Pool:
-    """The gestures with what an augmentation adds, all in one form, and those who judge alone.
+    """The gestures with what an augmentation adds, all in one form, and the samples that only judge.
 
     `box` is the threshold of Algorithm 1's bounding box.
     """

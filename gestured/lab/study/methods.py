@@ -1,8 +1,8 @@
-"""The registry: every method, its hyperparameters, and what the paper says it is worth.
+"""The registry: every method, its hyperparameters, and the paper's figures for it.
 
-Hyperparameters `paper` are those of the paper's Table IV (it has one column for plain and one for augmented data);
-for the networks the paper gives the layers and the LSTM's width, the rest is ours. The best of `grid` is the tuned
-setting. Feature vectors are standardised over what is learned from before KNN and SVM, which the paper leaves open.
+Hyperparameters `paper` are those of the paper's Table IV (it has one column for plain and one for augmented data); for
+the networks the paper gives the layers and the LSTM's width, the rest is ours. The best of `grid` is the tuned setting.
+Feature vectors are standardised over the training set before KNN and SVM, which the paper leaves open.
 """
 
 from collections.abc import Callable, Mapping
@@ -65,7 +65,7 @@ def _forest(values: Values, seed: int) -> ClassifierMixin:
 
 
 def _vectors(values: Values, seed: int) -> ClassifierMixin:
-    # One matrix product makes the kernel: libsvm's own takes minutes where there are many features.
+    # One matrix product makes the kernel: libsvm's own takes minutes if there are many features.
     kernel = partial(rbf_kernel, gamma=2.0 ** values["log2_gamma"])
     return make_pipeline(StandardScaler(), SVC(C=2.0 ** values["log2_c"], kernel=kernel))
 
@@ -86,7 +86,7 @@ def _estimate(
 
 @dataclass(frozen=True)
 class Method:
-    """One way to tell gestures apart."""
+    """A way to tell gestures apart."""
 
     id: str
     title: str
@@ -101,7 +101,7 @@ class Method:
 
     @property
     def network(self) -> bool:
-        """Whether it is trained in batches."""
+        """Whether the method is a network, which is trained in batches."""
         return "steps" in self.grid[0]
 
 

@@ -23,11 +23,11 @@ LEAST = 0.001  # an error of 0 is drawn here: a logarithm cannot show it
 WIDTH, HEIGHT = 1060, 430  # pixels
 TITLE = "Error against the time from the last touched frame to the answer"
 FRAME_MS = 1000 / WINDOW.rate_hz
-WAIT_MS = FRAME_MS + 1000 * Timing().release_s  # a contact is over after so much quiet, which a frame shows
+WAIT_MS = FRAME_MS + 1000 * Timing().release_s  # a contact is over after `release_s` of quiet, which a frame must show
 Name = tuple[float, float, bool, str]  # error, time, whether the model ships, words
 LINE = 15  # pixels of a name
 RAISED = 8  # pixels by which a name stands above its point: the line of the best models runs through the point
-NAMED = 2  # methods beside those that ship, the best ones of a field
+NAMED = 2  # best methods of a field that are named beside those that ship
 SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}
 CONFUSION = "Which gesture is taken for which"
 ACROSS = 4  # matrices beside each other
@@ -51,7 +51,7 @@ def write_picture(study: Study, out: Path) -> Path:
 
 
 def points(study: Study) -> Study:
-    """What the picture is drawn from, and where it comes from: the part of a study that is kept beside it."""
+    """The part of a study that the picture is drawn from and that is kept beside it, with its origin."""
     timed = {row["method"] for row in study["run_time"]}
     return {
         "about": {name: study["about"][name] for name in ("command", "version", "seed", "models", "quick")},
@@ -100,7 +100,7 @@ def _range(values: list[float]) -> str:
 
 
 def _field(study: Study, axes: Axes, rows: list[Row], field: str) -> list[Name]:
-    """One field: a point for each model, and the stair of those that no other model beats; the names of a few."""
+    """Draw one field: a point for each model, and the line of those that no other beats; returns names to write."""
     axes.set_yscale("log")
     axes.minorticks_off()
     axes.set_xlim(WAIT_MS - 4, WAIT_MS + FRAME_MS)
@@ -130,7 +130,7 @@ def _point(study: Study, row: Row, field: str) -> tuple[float, float, bool, str]
 
 def _name(axes: Axes, names: list[Name]) -> None:
     """Write names beside their points, the lowest first, none over another."""
-    free = -math.inf  # pixels, from which on no name stands
+    free = -math.inf  # pixels from which on no name stands
     for error, time, ships, words in sorted(names):
         at = float(axes.transData.transform((time, error))[1])
         up = max(at + RAISED, free) - at
@@ -143,7 +143,7 @@ def _name(axes: Axes, names: list[Name]) -> None:
 
 
 def confusion(study: Study) -> Figure:
-    """Of each method which gesture (row) is taken for which (column), in per cent of the row.
+    """For each method, which gesture (row) is taken for which (column), in per cent of the row.
 
     The cells are those of people never seen, tuned, with shifted copies.
     """
@@ -158,7 +158,7 @@ def confusion(study: Study) -> Figure:
     for k, (axes, row) in enumerate(zip(panels, rows, strict=False)):
         counts = np.array(row["confusion"], float)
         shares = 100 * counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-        axes.imshow(shares, cmap="Blues", vmin=0, vmax=140)  # no darker than that the number can be read
+        axes.imshow(shares, cmap="Blues", vmin=0, vmax=140)  # light enough for the numbers to be read
         axes.set_title(title(study, row["method"]), color=INK)
         axes.grid(visible=False)
         below = names if k + ACROSS >= len(rows) else [""] * len(names)

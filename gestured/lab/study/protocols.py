@@ -6,7 +6,7 @@ paper         85/15 by gesture, augmented before the split, filtered by a runnin
               (ours: 3 frames) or its windows are (ours: the 90th percentile of all gestures).
 padded        the same, but padded to the longest gesture, so that nothing is cut off
 clean         85/15 by gesture, split first; only the training part is augmented; every window has its own length
-participants  whole participants are held out, in folds: everybody is judged once, by what has never seen them
+participants  whole participants are held out, in folds: everybody is judged once, by models that have never seen them
 real          the same with the subjects of real recordings
 foreign       learned from all participants, judged on hands and sensors of another generator, which teaches nothing
 """
@@ -36,7 +36,7 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True)
 class Task:
-    """A cell: method, hyperparameters and data as the words say; `data` names one of the sets at hand."""
+    """One cell: its method, hyperparameters and data; `data` is the name of a set."""
 
     method: str
     values: tuple[tuple[str, Any], ...]  # hyperparameters, sorted
@@ -55,7 +55,7 @@ def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
 
 
 def _form(task: Task, data: Data) -> Form:
-    """What the paper's protocol does to all windows; elsewhere each keeps its own length, and is not filtered."""
+    """What the paper's protocol does to all windows; in others each keeps its length, and is not filtered."""
     if task.protocol not in LEAKY:
         return Form()
     share = 1.0 if task.protocol == PADDED else task.length
@@ -106,7 +106,7 @@ def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -
 
 
 def run(task: Task, data: Data) -> Result:
-    """Every judged gesture of a cell: whose it was, what it was, and what it was called.
+    """Every judged gesture of a cell: its person, its class, and the class that it was taken for.
 
     `same` (protocols that augment before they split): whether the very same window was learned from.
     """

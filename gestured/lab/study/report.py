@@ -17,7 +17,7 @@ PROTOCOLS = {
     "paper": "paper's protocol", "padded": "padded to the longest", "clean": "clean split",
     "participants": "participants held out", "real": "real, subjects held out", "foreign": "another generator",
 }  # fmt: skip
-CHOICES = {  # method -> who takes the model of it that ships
+CHOICES = {  # by method, when to take the model of it that ships
     "cnn_lstm": "you have no reason to take another: `gestured` runs it unless told otherwise",
     "lstm": "the first cannot be used; it is its fallback",
     "tp_rf": "neither network can be used; it mostly says `unknown`, so that it is seldom wrong",
@@ -47,7 +47,7 @@ def write_report(study: Study, out: Path) -> Path:
 
 
 def lines(study: Study) -> dict[tuple[str, str, str], dict[str, Row]]:
-    """Of each method, settings and augmentation the cells by protocol: the lines of the main table."""
+    """The cells by protocol, for each method, settings and augmentation: the lines of the main table."""
     found: dict[tuple[str, str, str], dict[str, Row]] = {}
     for row in study["cells"]:
         found.setdefault((row["method"], row["settings"], row["augmentation"]), {})[row["protocol"]] = row
@@ -55,7 +55,7 @@ def lines(study: Study) -> dict[tuple[str, str, str], dict[str, Row]]:
 
 
 def values(hyperparameters: Mapping[str, Any] | None) -> str:
-    """Hyperparameters by name; where they depend on the augmentation, those of each that differ from the first."""
+    """Hyperparameters as a text; if they depend on the augmentation, with those that differ from the first."""
     found = dict(hyperparameters or {})
     if not found or not all(isinstance(value, Mapping) for value in found.values()):
         told = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in found.items()}
@@ -65,7 +65,7 @@ def values(hyperparameters: Mapping[str, Any] | None) -> str:
 
 
 def choice(study: Study) -> list[str]:
-    """Lines of Markdown: the models that ship, and who takes which; a model that was not timed is left out."""
+    """Lines of Markdown: the models that ship, and when to take which; a model that was not timed is left out."""
     rows = {row["method"]: row for row in study["run_time"] if row["settings"] == "shipped"}
     false = {row["method"]: f"{row['false_per_minute']:.4g}" for row in study["online_shipped"]}
     told = list(HEAD)
@@ -84,6 +84,6 @@ def _percent(share: float | None) -> str:
 
 
 def _with_interval(of: Row) -> str:
-    """A field's error in per cent, and its interval where it has one."""
+    """A field's error in per cent, and its interval if it has one."""
     ends = "–".join(_percent(of[f"error_{end}"]) for end in ("low", "high") if f"error_{end}" in of)
     return _percent(of.get("error")) + (f" ({ends})" if ends else "")

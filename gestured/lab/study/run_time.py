@@ -1,16 +1,16 @@
 """Error against run time: what a gesture costs, from the segment that was cut to the answer, on one core.
 
-What is timed are the study's methods and the models that ship, window, features and decision included: networks and
-forests in onnxruntime (one thread), as in the daemon, the rest in scikit-learn. What
-counts is the processor's time, so that other programs on the machine do not. All take turns gesture by gesture, in
-another order each time: cold, 67 ms after the last one, as in a daemon at 15 Hz whose caches other programs have filled
-since; and warm, the same gesture at once again. All are judged on people whom none has learned from, neither the
-study's models, which learned from the whole cohort with shifted copies, nor the shipped ones.
+The study's methods and the models that ship are timed, window, features and decision included: networks and forests in
+onnxruntime (one thread), as in the daemon, the rest in scikit-learn. Processor time is measured, so that other programs
+on the machine do not count. All take turns gesture by gesture, in another order each time: cold, 67 ms after the last
+one, as in a daemon at 15 Hz whose caches other programs have filled since; and warm, the same gesture at once again.
+All are judged on people from whom neither the study's models, which learned from the whole cohort with shifted copies,
+nor the shipped ones have learned.
 
-How often each is wrong is said in three fields. `simulated` are those new people. `foreign` and `real` of the study's
-methods are the cells of these protocols (every gesture that was cut out is answered); of the shipped models what they
-publish of the other generator's windows, and the manifest's figures of real subjects, each judged by networks that
-never saw it.
+Errors are given in three fields. `simulated` is of those new people. For the study's methods, `foreign` and `real` are
+the cells of these protocols (every gesture that was cut out is answered). For the shipped models, `foreign` is of what
+they publish for the other generator's windows, and `real` has the manifest's figures of real subjects, each judged by
+networks that never saw that subject.
 """
 
 import os
@@ -60,7 +60,7 @@ class Runner:
 
     method: str
     settings: str
-    answer: Callable[[Segment], tuple[int, bool]]  # the class that it holds for the best, and whether it says so
+    answer: Callable[[Segment], tuple[int, bool]]  # the best class, and whether it is published
     size: int  # bytes on disk
 
 
@@ -73,7 +73,7 @@ class Graph:
 
     @classmethod
     def of_net(cls, module: nn.Module) -> "Graph":
-        """Of a trained network; batch, and time where there is one, stay open."""
+        """The graph of a trained network; batch, and time if there is one, stay open."""
         if isinstance(module, HistoryNet):
             return cls._traced(module, torch.rand(2, SENSOR_SIDE, SENSOR_SIDE), {0: "B"})
         return cls._traced(Answering(module), torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE), {0: "B", 1: "T"})
@@ -81,7 +81,7 @@ class Graph:
     @classmethod
     def _traced(cls, net: nn.Module, example: Tensor, axes: dict[int, str]) -> "Graph":
         with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
-            warnings.simplefilter("ignore")  # the tracer's; tests compare the graph with the network
+            warnings.simplefilter("ignore")  # warnings of the tracer; tests compare graph and network
             path = Path(folder) / "net.onnx"
             torch.onnx.export(
                 net.eval(), (example,), path, dynamo=False, opset_version=OPSET,
@@ -95,7 +95,7 @@ class Graph:
 
 
 def _learned(method: str, values: Values, model: Estimator | Graph) -> Runner:
-    """A method of the study, which rejects nothing; of scikit-learn's the size is that of its own form."""
+    """A method of the study, which rejects nothing; the size of a scikit-learn model is that of its pickle."""
     view = METHODS[method].view
 
     def answer(segment: Segment) -> tuple[int, bool]:
@@ -143,7 +143,7 @@ WARM = 20  # gestures that are answered before anything is timed
 
 
 def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data) -> list[dict[str, Any]]:
-    """The section of study.json; `judges` are people whom nothing has learned from."""
+    """The section `run_time` of study.json; `judges` are people from whom nothing has learned."""
     torch.set_num_threads(1)
     with _one_core(), threadpool_limits(1):
         found = runners(plan, tuned, data)
@@ -187,7 +187,7 @@ def _timed(found: list[Runner], segments: list[Segment], seed: int) -> list[tupl
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """This process on one of its cores, where the system can (Linux)."""
+    """Bind this process to one of its cores, if the system can (Linux)."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -203,7 +203,7 @@ SEEN = {"foreign": (FOREIGN, SHIFT), "real": (REAL, UNCHANGED)}  # protocol and 
 
 
 def field_of(evaluation: Mapping[str, Any]) -> dict[str, Any]:
-    """Of an `Evaluation` as JSON has it: the gestures said wrongly, and those said wrongly or lost, with intervals."""
+    """The shares of an `Evaluation`, as JSON has it, that are wrong, and that are wrong or lost, with intervals."""
     right, wrong = (
         [evaluation[name], *(evaluation["intervals"][name][end] for end in ("low", "high"))]
         for name in ("right", "wrong")

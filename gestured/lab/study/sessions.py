@@ -1,9 +1,9 @@
 """The online protocol: continuous sessions of new participants over UDP to a real daemon, with the study's own models.
 
 The touch-pattern forest, the LSTM and the CNN-LSTM learn from the whole cohort and its shifted copies, as in the paper,
-are exported, and run by the daemon. They know ten gestures and nothing else: they reject nothing, so
-every non-gesture (a fifth of what is performed) that is answered counts as extra. The shipped models, which do reject,
-play the same sessions for comparison (`shipped`). Each session is another person; the interval is over them.
+are exported, and run by the daemon. They know ten gestures and nothing else: they reject nothing, so every non-gesture
+(a fifth of what is performed) that is answered counts as extra. The shipped models, which do reject, play the same
+sessions for comparison (`shipped`). Each session is of another person; the interval is over people.
 """
 
 from pathlib import Path
@@ -49,7 +49,7 @@ def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None
 
 
 def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
-    """Play every session to a daemon with this model; counts and shares of the gestures that were performed."""
+    """Play every session to a daemon with this model; returns shares of the gestures that were performed."""
     tallies = []
     for take in progress(sessions, len(sessions), title):
         events, zero = play(model, take, SPEED)
@@ -69,7 +69,7 @@ def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
 
 
 def online(plan: Plan, tuned: dict[str, Values], data: Data) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The study's models, and the shipped ones."""
+    """The rows of the study's models, and those of the shipped ones."""
     if not plan.minutes:
         return [], []
     sessions = list(takes(plan.minutes, FIRST_PERSON))

@@ -40,7 +40,7 @@ PAPER_CITED = (
 
 
 def run(args: argparse.Namespace) -> int:
-    """`gestured-lab study`."""
+    """Run `gestured-lab study`."""
     torch.set_num_threads(1)
     require_marks("study", *(args.document or ())[:1])
     require_marks("choice", *(args.document or ())[1:])
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     write(args.out / "study.json", json.dumps(study))
     tables_path = write_report(study, args.out)
     if args.document:
-        lines = tables_path.read_text("utf-8").splitlines()[1:]  # the first says what they were made of, as `made` does
+        lines = tables_path.read_text("utf-8").splitlines()[1:]  # without the first line, which `made` replaces
         made = made_of(args.words, shipped().values())
         renew(args.document[0], "study", [made, "", *(line for line in lines if not line.startswith("!["))])
         write_picture(study, args.document[0].parent)
@@ -66,7 +66,7 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
     """Everything that study.json holds; `others` are recordings that judge and teach nothing."""
     start = time.monotonic()
     schedule.cache.mkdir(parents=True, exist_ok=True)
-    real = cohort.real(folder, plan.real)  # first, so that a wrong file is told of before half an hour of work
+    real = cohort.real(folder, plan.real)  # first, so that a wrong file is reported before half an hour of work
     foreign = cohort.judges(others) if others else None
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
     sets = {"simulated": Data.of("simulated", people.samples)}
@@ -102,7 +102,7 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
         "tuning": tuning,
         "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),
     }  # fmt: skip
-    # What is timed comes last and alone: nothing else of ours runs beside it.
+    # Timing comes last and alone: nothing else of this program runs beside it.
     simulated_data = sets["simulated"]
     judges = cohort.load_cohort(schedule.cache, plan.trials_of(plan.new_people), schedule.jobs, cohort.NEW_SEED)
     key = [simulated_data.key, asdict(plan), tuned, judges.samples.digest(), list(models.values())]

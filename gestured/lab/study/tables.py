@@ -25,7 +25,7 @@ class Plan:
     quick: bool = False
     seeds: int = 3  # splits and trainings of each cell of the main tables, with `seed` and those after it
     folds: int = 4  # of participants, and of real subjects
-    tuning_people: int = 12  # other participants, on whom hyperparameters are compared: nobody of them is judged
+    tuning_people: int = 12  # other participants, on whom hyperparameters are compared: none of them is judged
     tuning_folds: int = 5  # as the paper says
     new_people: int = 6  # participants whom nothing has learned from: they judge error against run time
     steps: int | None = None  # batches for every network; None: as its hyperparameters say
@@ -36,19 +36,19 @@ class Plan:
 
     @classmethod
     def small(cls, seed: int) -> "Plan":
-        """What takes some minutes on two cores."""
+        """A plan that takes some minutes on two cores."""
         return cls(
             seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, real=40,
             timed=3, minutes=0.0,
         )  # fmt: skip
 
     def trials(self) -> NDArray[np.int64]:
-        """Which of the cohort's trials are performed: all, or one in five of a third of the participants."""
+        """Which of the cohort's trials are performed: all, or a third of those of every third participant."""
         chosen = [t.index for t in TRIALS if not self.quick or (t.participant % 3 == 0 and t.inclination == 1)]
         return np.array(chosen, np.int64)
 
     def trials_of(self, people: int) -> NDArray[np.int64]:
-        """All trials of the first so many participants of another cohort; few of them in a quick study."""
+        """All trials of the first `people` participants of another cohort; in a quick study a third of them."""
         chosen = [t.index for t in TRIALS if t.participant < people and (not self.quick or t.inclination == 1)]
         return np.array(chosen, np.int64)
 
@@ -59,7 +59,7 @@ ASKED = {"real": (REAL,), "foreign": (FOREIGN,)}  # protocols of data that are n
 
 @dataclass(frozen=True)
 class Cell:
-    """A place in a table."""
+    """A cell of a table."""
 
     method: str
     settings: str
@@ -69,7 +69,7 @@ class Cell:
 
 
 def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
-    """The cells of all tables; what goes beyond the paper has tuned hyperparameters alone."""
+    """The cells of all tables; methods beyond the paper have tuned hyperparameters alone."""
     cells = []
     for method in METHODS.values():
         for settings in (GIVEN, TUNED) if method.paper else (TUNED,):
@@ -92,7 +92,7 @@ def _skipped(plan: Plan, settings: str, protocol: str, augmentation: str) -> boo
 
 
 def tasks_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> list[Task]:
-    """What has to be computed for a cell: the same with each seed."""
+    """The tasks of a cell: the same with each seed."""
     method, values = METHODS[cell.method], tuned[cell.method]
     if cell.settings == GIVEN:
         assert method.paper is not None
@@ -127,7 +127,7 @@ def right(result: Result) -> NDArray[np.bool_]:
 
 
 def row(cell: Cell, result: Result) -> dict[str, Any]:
-    """A cell as study.json has it."""
+    """The row of a cell in study.json."""
     count = len(GESTURES)
     confusion = np.zeros((count, count), int)
     np.add.at(confusion, (result["truth"], result["predicted"]), 1)
@@ -142,7 +142,7 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
 
 
 def by_trial(found: Mapping[Cell, Result], trials: Sequence[Trial]) -> list[dict[str, Any]]:
-    """Of each method, tuned and with shifted copies, the share right of people held out, by speed and inclination.
+    """For each method, tuned and with shifted copies, the share right of people held out, by speed and inclination.
 
     `trials` is what was performed, for each gesture of the simulated cohort.
     """
@@ -161,14 +161,14 @@ def by_trial(found: Mapping[Cell, Result], trials: Sequence[Trial]) -> list[dict
 
 
 def _spread(shares: Sequence[float]) -> float:
-    """The standard deviation over seeds; 0 of one."""
+    """The standard deviation over seeds; 0 for one seed."""
     return float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0
 
 
 def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
     """How much of the gain by augmentation comes from copies of test gestures in the training set.
 
-    `with_copy` counts test gestures, of all seeds, whose very same window is learned from too (a shift of zero). The
+    `with_copy` counts test gestures, of all seeds, of which the same window is learned from, too (a shift of zero). The
     gains are of augmentation under the paper's protocol and under the clean one.
     """
     out = []

@@ -1,4 +1,4 @@
-"""The study's networks, and one trainer for all: a fixed number of batches, so that more data is not longer training.
+"""The study's networks, and one trainer for all: a fixed number of batches, so that more data does not train longer.
 
 All answer after a given frame of each window; what comes later changes nothing, by construction (a recurrent layer is
 causal). The paper gives the LSTM's widths (81, 32, 10) and the kinds of layers; the convolutions' widths are left open:
@@ -103,7 +103,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Windows:
-    """What a sequence net learns from."""
+    """Windows, the inputs of a sequence net."""
 
     samples: Samples
     to_the_end: bool  # read after the last frame, padding included, and not after the last one with contact
@@ -123,7 +123,7 @@ class Windows:
 
 @dataclass(frozen=True)
 class Images:
-    """What the net on motion history images learns from."""
+    """Images, the inputs of the net on motion history images."""
 
     images: NDArray[np.float32]  # (G, R, C)
 

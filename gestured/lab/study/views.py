@@ -1,4 +1,4 @@
-"""What a method sees of a gesture: of all samples at once to learn from, and of one window when it is asked."""
+"""Views: the inputs of a method, of all samples at once to learn from, and of one window to answer."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from gestured.model.features import PRESSED, touch_pattern
 
 Values = Mapping[str, Any]  # hyperparameters
 Rows = NDArray[np.float32]
-WHOLE = 0.0  # the decay of a motion history takes as long as the gesture
+WHOLE = 0.0  # stands for a decay as long as the gesture
 WAVELET = "haar"
 WAVELET_LEVEL = 3
-TAXELS, POOLED = "taxels", "pooled"  # readings of what the features are
+TAXELS, POOLED = "taxels", "pooled"  # readings of the paper's features
 TOGETHER = 256  # windows whose wavelets are computed together: more of them do not fit into the cache
 TINY = 1e-9  # variance (of shares of the peak) at which a band counts as constant
 
@@ -85,8 +85,8 @@ def spatio_temporal(
 ) -> NDArray[np.float32]:
     """(N, T, R, C) windows -> (N, F): statistics of the bands of every taxel's discrete wavelet transform.
 
-    Of each band: L1 and L2 norm, skewness, kurtosis and standard deviation, and of each of these the mean, maximum and
-    variance over the taxels. The paper has the statistics and, in addition, the three spatial features; `TAXELS` is
+    For each band: L1 and L2 norm, skewness, kurtosis and standard deviation, and for each of these the mean, maximum
+    and variance over the taxels. The paper has the statistics and, in addition, the three spatial features; `TAXELS` is
     that reading and the default: levels + 1 bands x 5 x (R C + 3) features. `POOLED` keeps the spatial features alone,
     x 5 x 3, and forgets which taxel it was.
 
@@ -118,7 +118,7 @@ def trajectory_row(window: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class View:
-    """How windows become inputs. `by` names the hyperparameters that it looks at."""
+    """How windows become inputs. `by` names the hyperparameters on which these depend."""
 
     all: Callable[[Samples, Values, bool], Any]  # samples, hyperparameters, whether padding counts as part of a window
     one: Callable[[Rows, Values], Rows]  # (T, R, C) window, hyperparameters -> a batch of one
@@ -126,7 +126,7 @@ class View:
 
 
 def _alone(one: Callable[[Rows, Values], Rows], *by: str, form: Callable[[Rows], Any] = np.asarray) -> View:
-    """A view that looks at each window by itself; `form` is how a net wants all of them."""
+    """A view of each window by itself; `form` makes a net's inputs of all of them."""
 
     def every(samples: Samples, values: Values, padded: bool) -> Any:
         return form(np.concatenate([one(samples.window(i), values) for i in range(len(samples))]))
