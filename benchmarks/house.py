@@ -63,7 +63,7 @@ def classes() -> int:
 
 
 def packet(values: NDArray[np.float64]) -> bytes:
-    """One frame as a message of floats."""
+    """The OSC message of one frame, as floats."""
     message = OscMessageBuilder("/armrest/pressure")
     for value in values.ravel():
         message.add_arg(float(value), "f")

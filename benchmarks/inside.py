@@ -35,7 +35,7 @@ TOGETHER = 64  # packets of one read
 
 
 def decode() -> list[Row]:
-    """One frame of 81 floats against python-osc, parser against parser and frame against frame."""
+    """Rows for decoding one frame of 81 floats against python-osc: parser against parser, and frame against frame."""
     rng = np.random.default_rng(0)
     packet = Form("armrest", plain=True).packet(Frame(0.0, rng.uniform(0, 4000, (9, 9))), 0, 0.0)
     decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=False)
@@ -76,7 +76,7 @@ def _decode(figure: str, ours: Callable[[], object], theirs: Callable[[], object
 
 
 def recognise(model: str) -> Row:
-    """Prepare, infer and decide, against onnxruntime's bare `run` on the same window."""
+    """A row for recognising one gesture (prepare, infer, decide) against onnxruntime's bare `run` on its window."""
     take = touched(1, 60.0)
     front = FrontEnd(9, 9)
     cuts = [c for t, f in zip(take.sensor_times, take.frames, strict=True) for c in front.push(Frame(float(t), f))]
@@ -142,7 +142,7 @@ def follow() -> Row:
 
 
 def subscribers() -> Row:
-    """One event to 1,000 clients, 50 of whom read nothing, against as many bare sends."""
+    """A row for sending one event to 1,000 clients, 50 of whom read nothing, against as many bare sends."""
     return asyncio.run(_subscribers())
 
 

@@ -1,4 +1,4 @@
-"""What a few sensors cost beside other things on a small machine: processor time, and how often the daemon is woken."""
+"""What a few sensors cost on a small machine: processor time, and how often the daemon is woken."""
 
 import dataclasses
 import socket

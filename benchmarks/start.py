@@ -19,7 +19,7 @@ MORE = 200  # further sensors
 
 
 def start_and_memory(model: str) -> list[Row]:
-    """Seconds from exec to ready, and resident memory once one sensor has been heard."""
+    """Rows for the seconds from exec to ready, and for resident memory once one sensor has been heard."""
     path = str(shipped().get(model, model))
     open_model(path)  # a warm-up, which brings the files into the page cache
     memory: dict[str, list[float]] = {"ours": [], "bare": []}
@@ -50,7 +50,7 @@ def start_and_memory(model: str) -> list[Row]:
 
 
 def imports() -> Row:
-    """MiB that each import adds, one after the other."""
+    """A row of the MiB that each import adds, one after the other."""
     with Program("imports") as program:
         added = ", ".join(f"{name} {mib}" for name, mib in program.ready.items())
     return Row("resident memory of each import, in this order (MiB)", added, "", "", "", None)

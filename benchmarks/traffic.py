@@ -1,4 +1,4 @@
-"""What a running daemon does with traffic: packets a CPU second, and a thousand sensors on one core."""
+"""What a running daemon can receive: packets for each second of CPU, and a thousand sensors on one core."""
 
 import multiprocessing
 import os
@@ -87,7 +87,7 @@ def cpu_s_when_done(pid: int) -> float:
 
 
 def datagrams(model: str, pressed: int, goal: float, repeats: int = 5) -> Row:
-    """Datagrams a CPU second, front end and recognition on, against a protocol that does nothing.
+    """A row for datagrams a CPU second, front end and recognition on, against a protocol that does nothing.
 
     `pressed` of the sensors are touched.
     """

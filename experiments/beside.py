@@ -34,7 +34,7 @@ FIRST = 9_000_000  # the first person; nobody learns from them
 
 
 def case(name: str, wait: float, n: int) -> Stretch:
-    """One person, one thing laid on, one swipe beside it `wait` seconds later."""
+    """A stretch of one person: one thing laid on, and one swipe beside it `wait` seconds later."""
     person, rng = Participant(FIRST + n), generator(n, 0xBE5)
     sensor = SimulatedSensor.nominal(day=person.seed)
     kind = SWIPES[n % len(SWIPES)]

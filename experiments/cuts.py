@@ -100,7 +100,7 @@ class Sheet:
         return self
 
     def figures(self) -> dict[str, Any]:
-        """What is printed; shares are 0..1."""
+        """The figures that are printed; shares are 0..1."""
         n = max(self.gestures, 1)
 
         def share(counts: Counter[str], *names: str) -> dict[str, float]:

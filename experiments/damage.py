@@ -62,7 +62,7 @@ class Row:
     unended: int = 0  # violations of the events' grammar
 
     def figures(self) -> dict[str, Any]:
-        """What is printed."""
+        """The figures that are printed; shares are per cent."""
         damaged, others = self.damaged.total(), self.others.total()
         return {
             "fault": self.fault, "gestures": self.gestures, "damaged": damaged,

@@ -97,7 +97,7 @@ BAD = {
 
 
 def take(person: int) -> Take:
-    """What somebody does on a healthy sensor."""
+    """A session of somebody on a healthy sensor."""
     sensor = replace(SimulatedSensor.nominal(day=person), loss=0.0)
     return session(Participant(person), sensor, generator(person, 0xDE), SESSION_S, 0.0)
 

@@ -35,7 +35,7 @@ READINGS = 30
 
 @dataclass
 class Reading:
-    """The daemon at one moment."""
+    """The daemon's figures at one moment."""
 
     hours: float  # of the sensor's time
     resident: float  # MiB

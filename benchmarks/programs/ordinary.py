@@ -1,7 +1,8 @@
-"""What one would otherwise write: python-osc's asyncio server, torch in the same process, each frame classified anew.
+"""The ordinary script: python-osc's asyncio server, torch in the same process, each frame classified anew.
 
-A fair, ordinary script: the last two seconds of frames, the same two convolutions and LSTM (its weights are random,
-which costs the same), one line of JSON to each client for each frame. It knows no baseline, no segments and no unknown.
+It is what a user would write: the last two seconds of frames, the same two convolutions and LSTM (its weights are
+random, which costs the same), one line of JSON to each client for each frame. It has no baseline, no segments and no
+unknown.
 """
 
 import asyncio

@@ -70,7 +70,7 @@ class Performance:
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """What stays the same for one hand."""
+    """The traits of one hand, the same in all that it does."""
 
     sloppy: float  # 1 = a careful person, 2 = a hasty one
     press: float  # usual force

@@ -71,9 +71,9 @@ def _frames(recording: Take) -> Iterator[Frame]:
 
 
 def visible(recording: Take) -> bool:
-    """Whether what was done can be known from the frames at all, by anybody.
+    """Whether anybody could know from the frames what was done.
 
-    Some frame must rise above the noise; of a double tap one in each contact, with a clear dip between them.
+    Some frame must rise above the noise; in a double tap one in each contact, with a clear dip between them.
     """
     times, seen = recording["times"], recording["seen"]
     if recording["kind"] == "burst":
@@ -141,7 +141,7 @@ def _batch(task: tuple[str, str, str, int, bool, int, bool]) -> tuple[list[Outco
 
 
 def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
-    """Everything that the tables show, as plain data; shares are 0..1."""
+    """The figures of all tables, as plain data; shares are 0..1."""
     result: dict[str, Any] = {}
     for level in dict.fromkeys(o.level for o in outcomes):
         own = [o for o in outcomes if o.level == level]

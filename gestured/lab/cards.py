@@ -114,7 +114,7 @@ def _recordings(path: Path) -> str:
 
 
 def _rows(found: Mapping[str, Any], before: str = "") -> list[str]:
-    """A row for each set that a model was judged on; `before` stands before its name."""
+    """A row for each set that a model was judged on; `before` precedes its name."""
     sets = {f"simulated, {test}": values for test, values in found["simulated"].items()}
     sets |= {f"real, {test}": values for test, values in found.get("real", {}).items() if test != "kinds"}
     return [_row(f"{before}{title}", values) for title, values in sets.items()]

@@ -77,7 +77,7 @@ def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segmen
 
 
 def matched(segments: Iterable[Segment], performed: Sequence[Truth]) -> Iterator[Sample]:
-    """Windows of the segments that hold a performed gesture, or nothing but a non-gesture.
+    """Samples of the segments that hold a performed gesture, or nothing but a non-gesture.
 
     Segments are widened by a frame at both ends, since contact is known only to the frame.
     """

@@ -246,7 +246,7 @@ def _joined(parts: Sequence[Evidences]) -> Evidences:
 
 
 def as_in_sessions(samples: Samples) -> NDArray[np.int64]:
-    """Indices of all gestures, and of so many non-gestures that these are `OTHERS` of all, or of all that there are."""
+    """Indices of all gestures, and of as many non-gestures as give a share of `OTHERS`, or of all that there are."""
     others = np.flatnonzero(samples.labels == NONE)
     gestures = np.flatnonzero(samples.labels != NONE)
     count = round(len(gestures) * OTHERS / (1 - OTHERS))

@@ -135,7 +135,7 @@ def simulated_figures(models: Mapping[str, Model], data: TrainingData) -> dict[s
 
 
 def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:
-    """Share of each gesture's samples named rightly, and of each non-gesture's rejected."""
+    """By kind, the share of a gesture's samples named rightly, or of a non-gesture's rejected."""
     good = _good(given, samples, least)
     return {str(kind): round(float(good[samples.kinds == kind].mean()), 3) for kind in np.unique(samples.kinds)}
 

@@ -241,7 +241,10 @@ def optimiser_of(
 
 
 def asked(samples: Samples, ask: Callable[[Tensor, Tensor], Sequence[Tensor]]) -> list[Tensor]:
-    """The answers of `ask` to all samples, in their order."""
+    """The answers of `ask` to all samples, in their order.
+
+    `ask` takes batches of windows of similar length, and the frames of each, as `batch_of` gives them.
+    """
     order = np.argsort(samples.lengths(), kind="stable")
     with torch.no_grad():
         found = [ask(*batch_of(samples, order[i : i + 256])) for i in range(0, len(order), 256)]

@@ -121,7 +121,7 @@ class Standardising(nn.Module):
         self.scale.copy_(values.std(0).clamp(min=1e-3))
 
     def standardised(self, values: Tensor) -> Tensor:
-        """(B, inputs), bounded."""
+        """(B, inputs) -> (B, inputs), standardised and bounded."""
         return ((values - self.mean) / self.scale).clamp(-6, 6)
 
 

@@ -9,7 +9,7 @@ Value = str | int | float
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows under a head. A float is shown with two significant digits; `notes` stand below, as one paragraph."""
+    """A table with a head. A float is shown with two significant digits; `notes` stand below, as one paragraph."""
 
     title: str
     head: tuple[str, ...]

@@ -71,7 +71,7 @@ class TrainingPlan:
 
     @classmethod
     def quick(cls) -> "TrainingPlan":
-        """A run of some minutes, to try the pipeline; its models are worth nothing."""
+        """A run of some minutes, to try the pipeline; its models are of no use."""
         fit = FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
         return cls(
             days=10,
@@ -248,7 +248,7 @@ def calibration_set(trained: Trained, data: TrainingData) -> Calibrated:
 
 
 def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, jobs: int) -> Foretold:
-    """Answers before the end of networks that have not seen the calibration people, further ones and real subjects."""
+    """The `Foretold` of calibration people, further ones and real subjects, by networks that have not seen them."""
     further = simulated(cache, "wide", 4, plan.wide_early, jobs)
     alone = [data.calibrate, further]
     if data.lived is not None:
@@ -264,7 +264,7 @@ def judged(
 ) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
     """A network with its second opinion, their calibration, and figures of its answers (`answer_figures`).
 
-    If `data` holds everyday life, there is a verifier, too, and the threshold is fitted on answers after it.
+    If `data` holds everyday life, there is a verifier, too, and the threshold is fitted on its answers.
     """
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))

@@ -93,7 +93,7 @@ def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     last, first = (active * index).amax(2), time - (active * (time - index)).amax(2)  # (B, 1)
     end = read_at(x, lengths)[:, None]
     over = (end.to(x.dtype) > last).to(x.dtype)
-    after = peak.gather(2, end[:, None])[:, 0]  # activity there: little if the gesture is over
+    after = peak.gather(2, end[:, None])[:, 0]  # peak at `end`: little if the gesture is over
     blob = mean_blob(x, place, active * peak)
     duration, n = (last - first + 1).clamp(min=0), active.sum(2)
     rise = active * (1 - _before(active))  # a contact begins
@@ -145,7 +145,7 @@ def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     a, b = torch.stack([towards - way, before], 2), torch.stack([towards, way], 2)  # (B, 2, 2, T): x and y first
     crossed, dot = a * b.flip(1), (a * b).sum(1)
     cross = crossed[:, 0] - crossed[:, 1]
-    sense = (dot > 0) | (cross.abs() > 1e-3 * dot.abs())  # half a turn has no sense
+    sense = (dot > 0) | (cross.abs() > 1e-3 * dot.abs())  # half a turn has no sense of rotation
     winds = (step > 0.02) & (active > 0) & sense[:, :1]
     turns = (step > 0.04) & (before.square().sum(1, keepdim=True) > 0.0016)
     counted = torch.cat([winds, turns], 1).to(x.dtype)

@@ -89,7 +89,7 @@ class Shares:
     accepted: Interval  # of the non-gestures
 
     def as_dict(self) -> dict[str, object]:
-        """As JSON values: null for what is not known."""
+        """The shares as JSON values; null for NaN."""
         found: dict[str, object] = {"gestures": self.gestures, "non_gestures": self.others}
         for name in ("right", "wrong", "unknown", "accepted"):
             value = getattr(self, name)

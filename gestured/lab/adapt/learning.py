@@ -91,7 +91,7 @@ def learned(start: Judged, takes: Samples, own: Samples, course: Course, title: 
 
 
 def between(start: Judged, end: Judged, share: float) -> Judged:
-    """The networks a share of the way from `start` to `end`."""
+    """Networks whose weights lie a `share` of the way from `start` to `end`."""
     found = copy.deepcopy(start)
     ends = end.state_dict()
     found.load_state_dict({name: value + share * (ends[name] - value) for name, value in start.state_dict().items()})

@@ -42,7 +42,7 @@ class Base:
 
     @property
     def kind(self) -> str:
-        """Which of `RECURRENT` it is."""
+        """The name of the kind, one of `RECURRENT`."""
         return self.model.metadata.kind
 
 
@@ -100,7 +100,7 @@ def read(proto: onnx.ModelProto, kind: str, calibration: Mapping[str, Any]) -> J
 def _recurrent(
     judged: Judged, proto: onnx.ModelProto, stored: Mapping[str, NDArray[np.generic]]
 ) -> dict[str, NDArray[np.generic]]:
-    """The weights of every LSTM, under torch's names; they stand in the graph in the order of the modules."""
+    """The weights of every LSTM, under torch's names; the graph has them in the order of the modules."""
     layers = [name for name, module in judged.named_modules() if isinstance(module, nn.LSTM)]
     nodes = [node for node in proto.graph.node if node.op_type == "LSTM"]
     if len(nodes) != len(layers) or any(name not in stored for node in nodes for name in node.input[1:4]):

@@ -1,4 +1,4 @@
-"""The curve: gestures that were not recognised against false ones an hour, with every threshold, as SVG."""
+"""The curve: gestures that were missed or wrong against false ones an hour, with every threshold, as SVG."""
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator

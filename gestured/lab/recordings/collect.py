@@ -61,7 +61,7 @@ class Session:
         self.kind = ""  # kind of sensor, as in recordings
 
     def run(self, trials: Sequence[Exercise]) -> None:
-        """Ask for one trial after the other until all are kept, or somebody quits."""
+        """Ask for one trial after the other until all are kept or somebody quits."""
         say = self._terminal.say
         try:
             if not self._agree():

@@ -103,7 +103,7 @@ def performed_windows(count: int, kinds: Sequence[str]) -> Windows:
 
 
 def decisions_table(names: Sequence[str], quick: bool) -> Table:
-    """Shipped models, on windows of simulated gestures and non-gestures and on extreme ones."""
+    """The table of shipped models, on windows of simulated gestures and non-gestures and on extreme ones."""
     count = 10 if quick else 60
     sets = {
         "windows of gestures": performed_windows(count, GESTURES),

@@ -176,7 +176,7 @@ def cases() -> Iterator[Case]:
 
 
 def stiff_table(model: Model, quick: bool) -> Table:
-    """Each case over the same sessions, and a day."""
+    """The table of each case over the same sessions, and of a day."""
     people = range(FIRST, FIRST + (1 if quick else PEOPLE))
     rows = [_row(case.title, model, (_stretch(case, person) for person in people)) for case in cases()]
     rows.append(

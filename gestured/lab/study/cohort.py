@@ -1,4 +1,4 @@
-"""The simulated cohort of 3060 as the study needs it: each gesture's segment, its window, and who did what and how.
+"""The simulated cohort of 3060 for the study: each gesture's segment, its window, and who performed it and how.
 
 Every trial goes through the front end that the daemon runs. A trial whose gesture was not cut out is lost and counted;
 if several segments hold parts of it, the one that holds most of it stands for it. Beside the cohort there are other

@@ -1,4 +1,4 @@
-"""What a cell learns from: gestures, and Algorithm 1's copies of them."""
+"""The material of a cell: gestures, and Algorithm 1's copies of them."""
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache

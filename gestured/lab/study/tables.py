@@ -1,4 +1,4 @@
-"""The main tables: how much is computed, which cells there are, and what each says."""
+"""The main tables: how much is computed, which cells there are, and the figures of each."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
