@@ -26,7 +26,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def sensor(daemon: Daemon) -> Performer:
-    return ready(daemon)
+    return ready(daemon, "armrest")
 
 
 def begun(start, daemon: Daemon, *flags: object, sensor: str = "armrest"):

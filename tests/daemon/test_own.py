@@ -110,9 +110,9 @@ class Enrolment:
         return next(self._lines)
 
 
-def ready(daemon: Daemon, seed: int = 0) -> Performer:
-    """A sensor that no other test has, and that the daemon has learned."""
-    name = f"arm{next(NUMBERS)}"
+def ready(daemon: Daemon, name: str | None = None, seed: int = 0) -> Performer:
+    """A sensor that the daemon has learned; without a name it is one that no other test has."""
+    name = name or f"arm{next(NUMBERS)}"
     client = daemon.client().subscribe("gesture", sensors=[name])
     sensor = Performer(daemon, name, seed=seed)
     sensor.begin().perform("left")
