@@ -109,7 +109,7 @@ def main(arguments: list[str]) -> int | str:
                 ]:
                     return f"built twice, and not equal: {' '.join(differ)}"
                 if found := strange(files[0], files[1], git("ls-files").splitlines()):
-                    return "missing there, or too much:\n" + "\n".join(found)
+                    return "the wheel or the sdist lacks files, or has too many:\n" + "\n".join(found)
                 Path(out).mkdir(exist_ok=True)
                 for path in files:
                     (Path(out) / path.name).write_bytes(path.read_bytes())

@@ -19,7 +19,7 @@ CLIENT = '"client"'  # the mode of a session that connects to a router; in other
 # Settings unless --config has them: no search for peers on the network.
 UNLESS_SAID = {"mode": "client", "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
 ALWAYS = {"transport/shared_memory/enabled": False}  # else Zenoh opens no session under the systemd unit
-HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # the states of sensors whose frames come
+HEARD = frozenset(("ok", "degraded", "starting", "faulty", "inverted"))  # the states of sensors whose frames come
 
 
 class Zenoh:

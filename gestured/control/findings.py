@@ -108,7 +108,7 @@ def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
     else:
         yield Finding("ok", f"the daemon serves, {status['state']}, pid {status['pid']}")
     if status["loop_lag_s"] > SLOW_S:
-        late = f"it is {1000 * status['loop_lag_s']:.0f} ms late"
+        late = f"the daemon runs {1000 * status['loop_lag_s']:.0f} ms late"
         remedy = "the machine is too busy, or too many sensors send: give gestured a processor, or see docs/fleet.md"
         yield Finding("warn", late, remedy)
     if status["internal_errors"]:

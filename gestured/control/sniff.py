@@ -125,7 +125,7 @@ def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, byte
         receiver = socket.socket(family, socket.SOCK_DGRAM)
         receiver.bind(where)
     except OSError as error:
-        hint = "; without --listen I ask the daemon that has it" if error.errno == errno.EADDRINUSE else ""
+        hint = "; without --listen, sniff asks the daemon that listens there" if error.errno == errno.EADDRINUSE else ""
         reason = bind_failure(error, address, socket.SOCK_DGRAM)
         raise GesturedError(f"cannot listen on {address}: {reason}{hint}") from error
     with receiver:

@@ -121,7 +121,7 @@ def _words(tuned: Tuned) -> Iterator[str]:
     if played.skipped:
         yield f"left out, since the sensor was not known yet: {played.skipped}"
     if tuned.missed_by == "model":
-        yield "nobody performed a gesture: missed is what the model missed where it was judged"
+        yield "nobody performed a gesture: what is missed is taken from the model's own curve"
     yield f"threshold  missed   wrong  false/h   {'░ missed':<10}{'█ wrong and false'}"
     rows = [*((f"{row.threshold:.2f}", row) for row in tuned.rows), *tuned.points.items()]
     worst = max((row.missed or 0) + row.wrong + row.false for _, row in rows) or 1
@@ -148,7 +148,7 @@ def _words(tuned: Tuned) -> Iterator[str]:
         yield from (f"[gestures.{gesture}]", f"threshold = {tuned.each.get(gesture, best).threshold:.2f}")
     few = len(tuned.model.gestures) - len(tuned.each)
     if few:
-        yield f"# {few} were performed less than {ENOUGH} times: they have what suits all"
+        yield f"# {few} were performed less than {ENOUGH} times: they have the best one for all"
 
 
 def _said(tuned: Tuned, counts: Counts, name: str | None) -> str:

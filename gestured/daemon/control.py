@@ -142,7 +142,7 @@ class ControlServer:
             found = await verb.run(connection, **parameters)
             answer, lines = found if isinstance(found, tuple) else (found, None)
             if lines is not None and self._streaming:
-                raise Refusal("it is being sent to somebody else; ask again when that is over")
+                raise Refusal("the recording is being sent to somebody else; ask again when that is over")
             return {"ok": True, **answer}, lines
         except GesturedError as error:
             return _refused(str(error)), None

@@ -37,10 +37,14 @@ _OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Status], float]], ...] = (
     ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s["input"]["kernel_drops"]),
     (
         "gestured_loop_lag_seconds",
-        "How late the loop is, or the packets that it reads",
+        "Seconds by which the event loop runs late, or reads packets late",
         lambda s: s["loop_lag_s"],
     ),
-    ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s["model"]["rung"]),
+    (
+        "gestured_model_rung",
+        "Place of the model that answers: 0 is the first, 1 its first fallback",
+        lambda s: s["model"]["rung"],
+    ),
     ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s["model"]["failures"]),
     ("gestured_start_time_seconds", "When the daemon started", lambda s: s["started"]),
 )

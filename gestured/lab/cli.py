@@ -120,9 +120,9 @@ def parser() -> Parser:
         help="of simulated people, an hour each (default: 60)",
     )
     everyday.add_argument("--recordings", **mine, help="instead, hours of your own: tapes of gesturectl record, and "
-                          ".npz; where these do not tell what was performed all that is said is false")  # fmt: skip
+                          ".npz; if they do not say what was performed, every gesture counts as false")  # fmt: skip
     everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
-                          "makes it before each that is meant, and what is not armed is not said")  # fmt: skip
+                          "makes it before each gesture that is meant; without it no gesture counts")  # fmt: skip
     everyday.add_argument("--seconds", type=float, default=Arming("").seconds, metavar="S",
                           help="how long a gesture keeps the sensor armed, with --arming "
                           f"(default: {Arming('').seconds:g} s)")  # fmt: skip

@@ -63,7 +63,7 @@ def check(r: Recordings) -> None:
         if value.dtype.kind == "U" and value.size:  # numbers that are no characters would make broken strings
             codes = np.ascontiguousarray(value).view(np.uint32)
             if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
-                raise Wrong(f"{field}: holds what is no text")
+                raise Wrong(f"{field}: holds characters that are none")
     for rules in (_offsets, _values, _frames, _touches, _events):
         for field, right, expected, owner in rules(r):
             if not right.all():

@@ -76,7 +76,7 @@ class _Reading:
 
     def _message(self, message: Any, budget: Budget) -> None:
         if message.channel_id not in self._channels:
-            raise Damaged(f"a message of channel {message.channel_id}, which there is not")
+            raise Damaged(f"a message of channel {message.channel_id}, which the file does not define")
         topic, source = self._channels[message.channel_id]
         data = message.data
         if topic == PACKETS:

@@ -53,6 +53,10 @@ def test_tokens_live_as_daemon_and_sensors_do(bridge, site, fake):
     assert site.token() == ("gestured/car/armrest/alive", True)
     fake.say(STATUS | {"sensors": {"armrest": "stale"}})
     assert site.token() == ("gestured/car/armrest/alive", False)
+    fake.say(STATUS | {"sensors": {"armrest": "inverted"}})  # its frames come, though they fall under pressure
+    assert site.token() == ("gestured/car/armrest/alive", True)
+    fake.say(STATUS | {"sensors": {"armrest": "intermittent"}})
+    assert site.token() == ("gestured/car/armrest/alive", False)
     fake.close()  # as after a kill of the daemon
     assert site.token() == ("gestured/car/alive", False)
     fake.accept()

@@ -276,7 +276,7 @@ def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_m
     assert "proposed 0.96: 0 false" in words and "[gestures.one_tap]\nthreshold = 0.96" in words
     words, found = said(True)
     # By its curve the model misses a tenth of what the threshold is.
-    assert "missed is what the model missed where it was judged" in words and found["missed_by"] == "model"
+    assert "what is missed is taken from the model's own curve" in words and found["missed_by"] == "model"
     rows = {row["threshold"]: row["missed"] / (20 * 7) for row in found["thresholds"]}
     assert rows == pytest.approx({t: t / 10 for t in rows}) and found["proposed"]["missed"] > 0
     assert found["operating_points"]["strict"]["missed"] / 140 == pytest.approx(0.09)

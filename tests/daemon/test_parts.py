@@ -172,7 +172,7 @@ def test_an_overload_is_told_by_how_late_packets_are_read(model: Path, tmp_path:
         service.parts.receiver.behind_s = 3.0
         found = status(service.parts)
         assert found["loop_lag_s"] == 3.0 and healthy(service.parts)["healthy"]
-        assert any("3000 ms late" in finding.what for finding in examine_status(found))
+        assert any("the daemon runs 3000 ms late" in finding.what for finding in examine_status(found))
 
     with_service(model, tmp_path, look)
 

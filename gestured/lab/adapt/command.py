@@ -123,8 +123,8 @@ def _tell(own: Own, found: Adapted) -> None:
     say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
     for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
-    say(f"threshold {new.least:.3f}, where no more are wrong than before", WORTH[new.groups.unit])
-    say("it has no operating points, since its networks are new: every strictness is this threshold (gesturectl tune)")
+    say(f"threshold {new.least:.3f}, at which no more are wrong than before", WORTH[new.groups.unit])
+    say("the model has no operating points: every strictness takes this threshold (gesturectl tune proposes others)")
 
 
 def _row(title: str, shares: Shares) -> str:
