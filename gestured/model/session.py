@@ -1,4 +1,4 @@
-"""The session of a model: its graph, opened and run by onnxruntime, which only this module and the lab import."""
+"""The session of a model: its graph, opened and run by onnxruntime, which no other module imports."""
 
 import os
 import re
