@@ -148,7 +148,7 @@ def _words(tuned: Tuned) -> Iterator[str]:
         yield from (f"[gestures.{gesture}]", f"threshold = {tuned.each.get(gesture, best).threshold:.2f}")
     few = len(tuned.model.gestures) - len(tuned.each)
     if few:
-        yield f"# {few} were performed less than {ENOUGH} times: they have the best one for all"
+        yield f"# {few} were performed less than {ENOUGH} times: they have the common threshold"
 
 
 def _said(tuned: Tuned, counts: Counts, name: str | None) -> str:
