@@ -3,6 +3,7 @@
     make figures ARGS=--stale                 list tables made of other models or other code, and why
     make figures ARGS="--real ~/capfingerid"  make these tables again, one after the other
 
+Tables of older code are up to date where experiments/same.txt says that this code decides alike (`experiments.same`).
 An interrupted pass can be continued: a table that was written is up to date, and what a command only prints is kept in
 build/figures for its models and code. Each command's duration is printed.
 """
@@ -17,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from experiments.same import HELD, alike
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import LINE, OLDER, decides, digests, other_code, others
 from gestured.model.shipped import shipped
@@ -43,7 +45,8 @@ def made(root: Path) -> Iterator[Made]:
         for number, line in enumerate(lines, 1):
             if match := LINE.fullmatch(line.strip()):
                 why = [f"made of another {name}" for name in others(match, now)]
-                if other_code(match):
+                known = not match["modules"] and alike(match["code"] or "", decides(), HELD.read_text())
+                if other_code(match) and not known:
                     why.append("made with other code" if match["code"] else "does not say with which code")
                 if OLDER in lines[number : number + 2]:
                     why = ["says itself that it is older"]

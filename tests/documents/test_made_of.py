@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.figures import made, with_data
+from experiments.same import alike, compared, streams, told, write
 from gestured.core.errors import GesturedError
 from gestured.lab.made_of import LINE, OLDER, command_of, made_of, renew, signed
 from gestured.lab.recordings.origin import said
@@ -124,6 +125,25 @@ def test_a_table_of_other_models_or_of_other_code_is_listed(tmp_path: Path) -> N
     assert " of gestured.core.where" in line and "onnx" not in line
     page.write_text(line + "\n\n" + line.replace("core.where", "core.spots"))
     assert [one.why for one in made(tmp_path)] == ["", "made with other code"]
+
+
+def test_code_that_decides_as_other_code_did_makes_no_table_older() -> None:
+    lines = "# NOW BEFORE\nnow before 2026-11-28\nbefore first 2026-11-27\nother now 2026-11-29\n"
+    assert all(alike(older, "now", lines) for older in ("now", "before", "first"))
+    assert not alike("other", "now", lines) and not alike("now", "before", lines) and not alike("BEFORE", "NOW", lines)
+
+
+def test_two_checkouts_decide_alike_if_no_event_differs(tmp_path: Path) -> None:
+    assert write(streams(0, 2, None), tmp_path) == 1
+    _, *events = told(tmp_path, "cnn_lstm")
+    assert compared(iter(events), iter(events), "") == len(events) > 4
+    for wrong in (events[:-1], [*events[:2], "Onset(sensor='sensor0', id=1, onset=0.5)", *events[2:]]):
+        with pytest.raises(GesturedError, match=r"event \d+ differs"):
+            compared(iter(events), iter(wrong), "")
+    one, other = (f"{{}}(id=1, reason='{why}', gates=())" for why in ("confidence", "context"))
+    assert compared(iter([one.format("Unknown")]), iter([other.format("Unknown")]), "Unknown.reason") == 1
+    with pytest.raises(GesturedError, match="event 1 differs"):
+        compared(iter([one.format("Cancelled")]), iter([other.format("Cancelled")]), "Unknown.reason")
 
 
 def test_a_figure_without_its_data_says_what_is_missing(tmp_path: Path) -> None:

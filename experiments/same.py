@@ -1,0 +1,171 @@
+"""Whether this checkout decides as an older one does: of the same frames, to the last bit the same events.
+
+    git worktree add /tmp/before 2daaac0e
+    python -m experiments.same /tmp/before --real ../shared/data
+
+Both checkouts play hours of simulated everyday contact, simulated gestures on sensors of every kind, and perhaps real
+sessions. If no event differs, a line in experiments/same.txt says so, and what the older code has measured holds for
+this code, too: `make figures ARGS=--stale` does not list these tables. Otherwise the first event that differs is shown.
+
+`--but Unknown.reason` passes over the reasons of unknown events, for a change that means to give other reasons.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import date
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.errors import GesturedError
+from gestured.core.facts import events_of
+from gestured.core.frames import Frame
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
+from gestured.lab.made_of import decides
+from gestured.lab.progress import progress
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
+from gestured.record.arrays import read
+from gestured.simulator import generator
+from gestured.simulator.chance import CHANCE
+from gestured.simulator.cohort import wide
+from gestured.simulator.everyday import day
+from gestured.simulator.places import PLACES
+from gestured.simulator.variety import any_sensor
+
+HELD = Path(__file__).with_name("same.txt")
+SEED = 77  # of people from whom nothing has learned
+DAY_S = 720.0
+OF_A_PART = 50  # takes
+FASTEST_HZ = 30.0  # of a day's sensor; faster ones would take most of the time
+SILENCE_S = 5.0  # after the last frame
+FIELD = r", {}=(?:'[^']*'|[^,()]*)"  # of an event, as `repr` has it
+
+
+class Stream(NamedTuple):
+    """What one sensor has sent."""
+
+    times: NDArray[np.float64]  # (N,) s
+    frames: NDArray[Any]  # (N, R, C) counts
+
+
+def streams(days: int, takes: int, real: Path | None) -> Iterator[list[Stream]]:
+    """What both checkouts play, in parts; half of the days are those of a nominal sensor, the others of any."""
+    places = [*PLACES.values(), *CHANCE.values()]
+    for n in range(days):
+        rng = generator(SEED, 0xDA, n)
+        sensor = any_sensor(rng, float(rng.random()))
+        slow = replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)) if n % 2 else None
+        life = day(SEED * 1_000_000 + n, places[n // 2 % len(places)], DAY_S, slow)
+        yield [Stream(life.take.times, life.take.frames)]
+    for first in range(0, takes, OF_A_PART):
+        found = [wide(SEED, n) for n in range(first, min(first + OF_A_PART, takes))]
+        yield [Stream(take.times, take.frames) for take in found]
+    for path in sorted(real.glob("*sessions*.npz")) if real else ():
+        held = read(path)
+        yield [Stream(held.times_of(i), held.frames_of(i)) for i in range(len(held))]
+
+
+def write(parts: Iterator[list[Stream]], folder: Path) -> int:
+    """Write parts into a folder, one file each; says how many."""
+    n = 0
+    for n, part in enumerate(parts, 1):
+        arrays = {f"{name}{k}": each for k, one in enumerate(part) for name, each in one._asdict().items()}
+        np.savez(folder / f"{n:03}", **arrays)  # type: ignore[arg-type]
+    return n
+
+
+def told(folder: Path, model: str) -> Iterator[str]:
+    """The digest of the code that runs, and its events of the parts in a folder, in the order of their names."""
+    yield decides()
+    opened = open_model(model)
+    for path in sorted(folder.iterdir()):
+        with np.load(path) as held:
+            for n in range(len(held.files) // 2):
+                one = Stream(held[f"times{n}"], held[f"frames{n}"])
+                rows, columns = one.frames.shape[1:]
+                sensor = Sensor(f"{path.stem}_{n}", Scene(opened.gestures, (rows, columns)), opened)
+                sensor.foresee(asked=True)
+                for t, values in zip(one.times.tolist(), one.frames, strict=True):
+                    yield from map(repr, events_of(sensor.push(Frame(t, values))))
+                yield from map(repr, events_of(sensor.flush(float(one.times[-1]) + SILENCE_S)))
+
+
+def told_by(checkout: Path, *words: str) -> Iterator[str]:
+    """What `told` gives with the package of a checkout, in a process of its own that begins at once."""
+    command = [sys.executable, __file__, "--tell", *words]
+    environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    def lines() -> Iterator[str]:
+        assert process.stdout is not None
+        yield from process.stdout
+        if process.wait():
+            raise GesturedError(f"{checkout}: its process ended with {process.returncode}")
+
+    return lines()
+
+
+def compared(here: Iterator[str], there: Iterator[str], but: str) -> int:
+    """How many events are told in both. The field that `but` names is passed over. Raises GesturedError otherwise."""
+    kind, _, field = but.partition(".")
+    passed = re.compile(FIELD.format(re.escape(field)))
+
+    def seen(event: str | None) -> str | None:
+        return passed.sub("", event) if event and but and event.startswith(f"{kind}(") else event
+
+    events = 0
+    for events, (one, other) in enumerate(zip_longest(here, there), 1):
+        if seen(one) != seen(other):
+            raise GesturedError(f"event {events} differs\n  here:  {one}  there: {other}")
+    return events
+
+
+def alike(older: str, newer: str, lines: str) -> bool:
+    """Whether lines of same.txt say, perhaps one after the other, that two digests of code decide alike."""
+    pairs = [line.split()[:2] for line in lines.splitlines() if not line.startswith("#")]
+    known = {newer}
+    while more := {before for now, before in pairs if now in known} - known:
+        known |= more
+    return older in known
+
+
+def main() -> None:
+    """Compare two checkouts, and say so in same.txt if no event differs."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("before", type=Path, metavar="CHECKOUT", help="the older one's folder")
+    parser.add_argument("--days", type=int, default=60, help="of twelve minutes (%(default)s)")
+    parser.add_argument("--takes", type=int, default=1500, help="single performances on any sensor (%(default)s)")
+    parser.add_argument("--real", type=Path, metavar="FOLDER", help="of real recordings, as docs/training.md has it")
+    parser.add_argument("--but", default="", metavar="EVENT.FIELD", help="what may differ")
+    parser.add_argument("--tell", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.tell:
+        for line in told(args.before, str(shipped()["cnn_lstm"])):
+            print(line)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        count = args.days - (-args.takes // OF_A_PART) + bool(args.real)
+        write(progress(streams(args.days, args.takes, args.real), count, "streams"), Path(folder))
+        here, there = (told_by(root, folder) for root in (Path(), args.before))
+        digests = next(here).strip(), next(there).strip()
+        events = compared(here, there, args.but)
+    what = f"{args.days * DAY_S / 3600:g} h of days, {args.takes} takes{' and real sessions' if args.real else ''}"
+    line = f"{' '.join(digests)} {date.today()} {events} events of {what}{args.but and f', but for {args.but}'}"
+    print(line)
+    with HELD.open("a") as file:
+        file.write(f"{line}\n")
+
+
+if __name__ == "__main__":
+    main()
