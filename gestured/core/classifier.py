@@ -56,8 +56,8 @@ class Classifier(Protocol):
         ...
 
     def preview(self, segment: Segment) -> Scores | None:
-        """Score the beginning of a segment; None if that fails. No later answer may depend on it.
+        """Score the beginning of a segment, or a segment in another context; None if that fails.
 
-        It is called only if there is a `certainty`.
+        No later answer may depend on it. Beginnings are scored only if there is a `certainty`.
         """
         return None

@@ -79,8 +79,9 @@ class Gesture:
 class Unknown:
     """A segment that is no gesture, of which the model is not sure enough, or that does not count now.
 
-    `reason` is confidence (below the threshold), hole (frames were lost), rate (the sensor is too slow or too fast),
-    disarmed (the gesture that arms the sensor did not come before) or inhibited (a gate is closed, or was).
+    `reason` is confidence (below the threshold), context (the same, but it would not be if nothing had gone before the
+    contact or rested on the sensor), hole (frames were lost), rate (the sensor is too slow or too fast), disarmed (the
+    gesture that arms the sensor did not come before) or inhibited (a gate is closed, or was).
     """
 
     sensor: str
@@ -94,7 +95,7 @@ class Unknown:
     model: str
     degraded: bool
     scores: Mapping[str, float]
-    reason: str = "confidence"  # confidence, hole, rate, disarmed, inhibited
+    reason: str = "confidence"  # confidence, context, hole, rate, disarmed, inhibited
     provisional: str | None = None
     where: Where | None = None
     gates: tuple[str, ...] = ()  # names of the gates that silenced it

@@ -6,6 +6,7 @@ frames arrive. A caller without arrivals (`gestured.open`, the lab) uses only `p
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from gestured.core.beside.foresight import Foresight, Preview
@@ -18,7 +19,7 @@ from gestured.core.decision import Decision
 from gestured.core.errors import ModelError
 from gestured.core.events import ANSWERS, Cancelled, Event, Gate, Gesture, Onset, Release, Unknown, Where
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import UNDISTURBED, Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened
 from gestured.core.listening import INHIBITED, Listening
 from gestured.core.owner import Owner, Source
@@ -205,7 +206,8 @@ class Sensor:
         why = listening.refusal(segment.onset, recognised)
         if why is None and recognised is None:
             # At a rate that the model does not know, holes and low confidence follow from the rate: it is the reason.
-            why = "rate" if outside(self.front_end.rate_hz) else "confidence" if seen else "hole"
+            score = scores[best] if decision.may(best, at.zone) else 0.0
+            why = "rate" if outside(self.front_end.rate_hz) else self._doubt(segment, score, least) if seen else "hole"
         if why is not None:
             gates = listening.silenced if why == INHIBITED else ()
             unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=at, gates=gates)
@@ -217,6 +219,16 @@ class Sensor:
         gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=at)
         armed = [self._gate(cut.decided)] if listening.heard(cut.decided) else []
         return [self._foresight.judged(gesture), decided, *armed]
+
+    def _doubt(self, segment: Segment, score: float, least: float) -> str:
+        """Why a segment's best gesture, with that score, is less sure than `least`: "context" if its past is why.
+
+        To find that out takes a run of the model, on which no answer depends. It takes none if the score is too low.
+        """
+        if score < least or segment.before == UNDISTURBED:
+            return "confidence"
+        alone = self.classifier.preview(replace(segment, before=UNDISTURBED))
+        return "context" if alone is not None and score * (1.0 - alone.unknown) >= least else "confidence"
 
     def _cancelled(self, why: str) -> Cancelled:
         self.shown = None

@@ -76,7 +76,7 @@ class Model:
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold, points=self.points)
 
     def preview(self, segment: Segment) -> Scores | None:
-        """The scores of the beginning of a segment, None if that fails."""
+        """What `classify` gives, None if that fails."""
         try:
             return self.classify(segment)
         except ModelError:

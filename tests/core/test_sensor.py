@@ -17,7 +17,7 @@ from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import events_of
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import UNDISTURBED, Frame, Segment
 from gestured.core.front_end import Cut, Found, FrontEnd, Void
 from gestured.core.points import STRICTNESS, Point
 from gestured.core.scene import Scene, Setup
@@ -216,6 +216,45 @@ def test_a_rate_that_the_models_do_not_know_is_the_reason(rate: int, reason: str
     stream = frames(f"sensor rate {rate}", "quiet for 3s", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 2s")
     (answer,) = answers(run(recognizer(Fake([says(0.2, 0.2, 0.2)])), stream))
     assert isinstance(answer, Unknown) and answer.reason == reason
+
+
+@dataclass
+class Surrounded(Fake):
+    """Finds a segment less likely to be a gesture after another one."""
+
+    value: float = 0.9
+    answers_alone: bool = True
+    previews: int = 0
+
+    def classify(self, segment: Segment) -> Scores:
+        self.seen.append(segment)
+        return says(self.value, 1 - self.value, 0.0, unknown=0.1 if segment.before == UNDISTURBED else 0.9)
+
+    def preview(self, segment: Segment) -> Scores | None:
+        self.previews += 1
+        return self.classify(segment) if self.answers_alone else None
+
+
+def test_a_gesture_that_only_its_surroundings_make_unsure_has_them_as_the_reason() -> None:
+    classifier = Surrounded()
+    alone, soon = answers(run(recognizer(classifier), swipes(2)))
+    assert isinstance(alone, Gesture) and isinstance(soon, Unknown)
+    assert soon.reason == "context" and soon.confidence == pytest.approx(0.9 * 0.1)
+    assert classifier.previews == 1 and soon.scores == alone.scores
+
+
+@pytest.mark.parametrize(
+    ("classifier", "least", "previews"),
+    [
+        (Surrounded(value=0.54), 0.5, 1),  # alone it would not be sure enough either
+        (Surrounded(answers_alone=False), 0.5, 1),
+        (Surrounded(), 0.95, 0),  # the score alone is too low, so that no run of the model is needed
+    ],
+)
+def test_other_reasons_are_not_taken_for_the_surroundings(classifier: Surrounded, least: float, previews: int) -> None:
+    *_, soon = answers(run(recognizer(classifier, thresholds={"double_tap": least}), swipes(2)))
+    assert isinstance(soon, Unknown)
+    assert (soon.reason, classifier.previews) == ("confidence", previews)
 
 
 # --- what is decided
