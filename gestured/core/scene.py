@@ -52,7 +52,7 @@ class Scene:
     sensors: Mapping[str, Setup] = field(default_factory=dict)  # by name; a place is kept free for each of these
     addresses: Addresses = Addresses()
     clock: Clock = "arrival"
-    stale_s: float = 1.0  # after so long a silence a sensor counts as gone
+    stale_s: float = Timing().stale_s  # after so long a silence a sensor counts as gone
     tap_gap_s: float = Timing().tap_gap_s  # how long a tap waits for a second one
     max_sensors: int = 64
     allow: tuple[Network, ...] = ()  # networks whose hosts may send; all hosts may if it is empty
