@@ -21,6 +21,8 @@ from tests.control.pages import Page, viewing
 from tests.daemon.harness import Daemon, Frame, Sensor
 from tests.documents.blocks import blocks
 
+SHOWN = "document.getElementById('state')?.textContent.startsWith('gestured ')"
+
 
 def follow(page: Page, browser: Browser, name: str, real: Daemon) -> Sensor:
     """Open the page, and a sensor that it looks at."""
@@ -268,6 +270,16 @@ def test_a_further_tab_says_what_it_waits_for(view: Page, browser: Browser) -> N
     browser.until(f"{said}.startsWith('gestured ')")
     for tab in tabs:
         tab.close()
+
+
+def test_who_skips_to_the_answer_may_load_the_page_again(view: Page, browser: Browser) -> None:
+    """The link changes the address's fragment, in which the token was."""
+    browser.call("Page.navigate", url=view.whole)
+    browser.until(SHOWN)
+    browser.run("document.querySelector('.skip').click(); window.before = true")
+    browser.until("location.hash === '#what'")
+    browser.call("Page.reload")
+    browser.until(f"!window.before && {SHOWN}")
 
 
 @pytest.mark.parametrize("then", [{"grid": [4, 4]}, {"time": 50.0}], ids=["another grid", "a clock set back"])

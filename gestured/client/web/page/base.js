@@ -12,7 +12,7 @@ function words(name) { return String(name).replaceAll("_", " "); }
 function percent(share) { return `${Math.round(100 * share)} %`; }
 
 async function ask(path, more) {
-  return fetch(path, { ...more, headers: { "X-Gestured-Token": door.secret || door.token, ...more?.headers } });
+  return fetch(path, { ...more, headers: { "X-Gestured-Token": door.secret, ...more?.headers } });
 }
 
 async function post(path, what) {
@@ -20,9 +20,12 @@ async function post(path, what) {
     .then(r => r.json(), error => ({ error: String(error) }));
 }
 
-async function enter() { // throws the reason where the door is closed
-  if (door.token) door.secret = "";
-  const told = await post("open", {});
+async function enter() { // by the token, else by the secret that this tab has kept; throws the reason where the door is closed
+  let told;
+  for (const key of new Set([door.token || door.secret, door.secret])) {
+    door.secret = key;
+    if (!(told = await post("open", {})).error) break;
+  }
   if (told.error) throw new Error(told.error);
   sessionStorage.setItem("secret", door.secret = told.secret);
 }
