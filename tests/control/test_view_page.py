@@ -272,12 +272,21 @@ def test_a_further_tab_says_what_it_waits_for(view: Page, browser: Browser) -> N
         tab.close()
 
 
+def test_an_address_that_is_opened_in_the_tab_of_the_last_one_opens_the_page(view: Page, browser: Browser) -> None:
+    """A browser loads nothing by itself if only the fragment changes."""
+    browser.call("Page.navigate", url=f"http://{view.address}/#of-a-program-that-has-ended")
+    browser.until("document.getElementById('state')?.textContent.startsWith('This address has been used')")
+    browser.call("Page.navigate", url=view.whole)
+    browser.until(SHOWN)
+
+
 def test_who_skips_to_the_answer_may_load_the_page_again(view: Page, browser: Browser) -> None:
     """The link changes the address's fragment, in which the token was."""
     browser.call("Page.navigate", url=view.whole)
     browser.until(SHOWN)
     browser.run("document.querySelector('.skip').click(); window.before = true")
     browser.until("location.hash === '#what'")
+    assert browser.run("window.before")
     browser.call("Page.reload")
     browser.until(f"!window.before && {SHOWN}")
 
