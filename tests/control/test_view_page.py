@@ -24,6 +24,16 @@ from tests.documents.blocks import blocks
 SHOWN = "document.getElementById('state')?.textContent.startsWith('gestured ')"
 
 
+# What a page writes anew if it is told the same twice, of what screen readers read aloud when it is written.
+ANEW = """(kind, what) => {
+    kinds[kind](what);
+    const seen = new MutationObserver(() => {});
+    for (const one of document.querySelectorAll('[role=status]')) seen.observe(one, { childList: true, subtree: true });
+    kinds[kind](what);
+    return seen.takeRecords().map(record => record.target.id);
+}"""
+
+
 def follow(page: Page, browser: Browser, name: str, real: Daemon) -> Sensor:
     """Open the page, and a sensor that it looks at."""
     sensor = Sensor(real, name).begin()
@@ -190,6 +200,9 @@ def test_the_page_says_what_is_wrong_and_what_to_do(serve, browser: Browser) -> 
         assert "gesturectl sniff" in browser.run(findings)
         assert browser.run("document.getElementById('flag').disabled")
         assert "--flight-recorder" in browser.run("document.getElementById('done').textContent")
+        again = f"kinds.sensors = told => {{ kinds.sensors = sensors; done(({ANEW})('sensors', told)) }}"
+        assert browser.run(f"new Promise(done => {{ {again} }})") == []
+        assert browser.run(f"({ANEW})('gone', {{ reason: 'it hangs' }})") == []
         sensor = Sensor(daemon, "arm").begin()
         swipe = sensor.hand.swipe("left")
         for _ in range(6):

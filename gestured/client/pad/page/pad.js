@@ -5,11 +5,6 @@ const KEYS = { "\n": "Keep, go on", r: "Repeat", d: "Discard", y: "Keep all the 
 const pad = at("pad"), down = new Map(), trail = [];
 const state = { seat: null, waiting: [], flying: false, frame: null, stream: new AbortController(), drawn: 0 };
 
-function status(text, gone) {
-  at("state").textContent = text;
-  at("state").classList.toggle("gone", gone);
-}
-
 function over(told) { state.stream.abort(); state.seat = null; status(told.reason, true); }
 
 function seat(told) {

@@ -11,6 +11,17 @@ history.replaceState(null, "", "/"); // the token works once: for a secret that 
 function words(name) { return String(name).replaceAll("_", " "); }
 function percent(share) { return `${Math.round(100 * share)} %`; }
 
+function write(id, ...parts) { // what is written again is read aloud again, and can no longer be marked: only if it differs
+  const place = at(id), fresh = place.cloneNode();
+  fresh.append(...parts);
+  if (!fresh.isEqualNode(place)) place.replaceChildren(...parts);
+}
+
+function status(text, gone) {
+  write("state", text);
+  at("state").classList.toggle("gone", gone);
+}
+
 async function ask(path, more) {
   return fetch(path, { ...more, headers: { "X-Gestured-Token": door.secret, ...more?.headers } });
 }

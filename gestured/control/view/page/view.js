@@ -28,8 +28,7 @@ function open(sensor) {
 }
 
 function daemon(text, gone) {
-  at("state").textContent = text;
-  at("state").classList.toggle("gone", gone);
+  status(text, gone);
   if (!gone) return;
   absent(true); rest(); heard(null, "");
   at("flag").disabled = true;
@@ -54,7 +53,7 @@ function sensors(told) {
   absent(!seen || seen.state === "stale" || seen.state === "no_data");
   const minutes = Math.round((Date.now() / 1000 - counted.since) / 60);
   at("since").textContent = minutes < 60 ? `since this page was opened, ${minutes} min ago` : "in the last hour";
-  at("findings").replaceChildren(...told.findings.filter(f => !f.sensor || f.sensor === state.sensor).map(f => {
+  write("findings", ...told.findings.filter(f => !f.sensor || f.sensor === state.sensor).map(f => {
     const li = document.createElement("li"), what = document.createElement("strong");
     what.textContent = f.what;
     li.append(what, f.remedy && `\n${f.remedy}`);
@@ -76,7 +75,7 @@ function listens(told) {
 }
 
 function heard(told, absent = state.sensor && "not heard so far") { // what the sensor that is looked at listens to
-  at("listens").textContent = told ? listens(told) : absent;
+  write("listens", told ? listens(told) : absent);
   at("gate").disabled = at("recalibrate").disabled = !told;
   at("gate").setAttribute("aria-checked", String(!told?.closed?.includes("view")));
 }
