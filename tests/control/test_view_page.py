@@ -349,6 +349,19 @@ def test_pause_step_back_and_keys(sensor: Sensor, browser: Browser) -> None:
     assert browser.run("document.getElementById('counts').checked") is True
     key(" ", "Space")
     browser.until("!state.paused && document.getElementById('ago').textContent === 'now'")
+    for focus, name, code in (("when", " ", "Space"), ("pause", "ArrowLeft", "ArrowLeft")):  # after a click on it
+        browser.run(f"pause(true); document.getElementById('{focus}').focus()")
+        before = browser.run("[state.paused, state.moment].join()")
+        key(name, code)
+        assert browser.run("[state.paused, state.moment].join()") != before
+    browser.run("pause(true); document.querySelector('.scroll').focus()")
+    before = browser.run("[state.paused, state.moment].join()")
+    key("ArrowLeft", "ArrowLeft")  # scrolls the table
+    browser.run("document.getElementById('note').focus()")
+    key("c", "KeyC")
+    assert browser.run("[state.paused, state.moment].join()") == before
+    assert browser.run("document.getElementById('note').value") == "c"
+    browser.run("document.getElementById('note').blur()")
     key("m", "KeyM")
     sensor.send([sensor.hand.frame()])
     browser.until("document.getElementById('raw').checked && state.frames.some(f => f.raw)")

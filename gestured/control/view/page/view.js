@@ -4,6 +4,7 @@ const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100, HOUR_S = 3600, OUTLIERS
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
 const NO_RECORDER = "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
+const OWN_KEYS = { text: /./, "select-one": /./, range: /^Arrow/, checkbox: / /, submit: / / }; // by type of what has the focus
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
 const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false, sliders: [] };
 const counted = { since: Date.now() / 1000, times: {} }; // by sensor and type: when contacts were answered, s
@@ -319,9 +320,10 @@ at("gate").onclick = () => {
 addEventListener("resize", plan);
 addEventListener("keydown", e => {
   if (e.repeat && !e.key.startsWith("Arrow")) return; // a key that is held asks once
-  if (e.ctrlKey || e.altKey || e.metaKey || /^(INPUT|SELECT|BUTTON)$/.test(e.target.tagName) && e.target.type !== "checkbox") return;
+  const own = e.target.closest(".scroll") ? /^Arrow| / : OWN_KEYS[e.target.type]; // what it does itself with a key
+  if (e.ctrlKey || e.altKey || e.metaKey || own?.test(e.key)) return;
   const keys = { " ": () => pause(!state.paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), c: () => at("counts").click(), m: () => at("raw").click(), f: () => at("flag").click(), r: () => at("recalibrate").click(), h: () => at("gate").click() };
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
-  if (wanted && !(e.key === " " && e.target.type === "checkbox")) { e.preventDefault(); wanted(); }
+  if (wanted) { e.preventDefault(); wanted(); }
 });
 enter().then(() => open(""), error => daemon(error.message, true));
