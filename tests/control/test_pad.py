@@ -1,14 +1,17 @@
 """`gesturectl pad`: what is drawn on a pad is felt, sent and named; who may touch it, and how much."""
 
+import errno
 import json
 import math
 import signal
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import Mock
 
 import pytest
 
@@ -224,11 +227,33 @@ def test_a_pad_that_nobody_touches_ends() -> None:
         assert touch(page, number, FINGER)[0] == 403 and page.ask("/open", "POST", {})[0] == 403
 
 
-def test_where_nobody_listens_the_page_is_told() -> None:
+def test_the_page_is_told_why_frames_are_not_heard_for_as_long_as_they_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("gestured.client.pad.pad.AGAIN_S", 0.05)
     with served() as (_, page):
         stream, _ = seat(page.come_in())
-        while stream.until("frame")[1]["heard"]:
-            pass
+        for wrong in ("nobody listens on", "cannot send to", "nobody listens on"):
+            with monkeypatch.context() as patch:
+                if wrong == "cannot send to":
+                    unreachable = Mock(side_effect=OSError(errno.EHOSTUNREACH, "No route to host"))
+                    patch.setattr("gestured.client.sensor.sent_after_refusal", unreachable)
+                while not stream.until("frame")[1]["wrong"].startswith(wrong):
+                    pass
+
+
+def test_a_message_that_was_lost_is_said_until_one_arrives(udp: socket.socket, browser: Browser) -> None:
+    with served(Address(*udp.getsockname())) as (_, page):
+        browser.call("Page.navigate", url=page.whole)
+        browser.until("typeof state === 'object' && state.drawn > 0")
+        said = browser.run("at('state').textContent")
+        hand = Hand(browser)
+        browser.run("fetching = fetch; fetch = () => Promise.reject(new TypeError('cut'))")
+        hand.mouse(STILL, 0.1)
+        browser.until("at('state').classList.contains('gone')")
+        browser.run("fetch = fetching")
+        hand.let_go()
+        browser.until(f"at('state').textContent === {said!r} && !at('state').classList.contains('gone')")
 
 
 def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(serve, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,6 +37,7 @@ class Pad:
         self.lock = threading.Lock()  # for the contacts
         self._textile = LiveTextile(sensor, time.time_ns())
         self._sender = Sensor(to, Form(name))
+        self._wrong = ""  # why the last frame was not sent or not heard
 
     def begin(self, tell: Tell, events: Subscriber | None = None) -> None:
         """Send frames from now on; `tell` gets each frame and each event for the page.
@@ -58,8 +59,7 @@ class Pad:
             try:
                 self._sender.send(frames)
             except GesturedError as error:
-                if not stop.is_set():
-                    self._tell("gone", {"reason": str(error)})
+                self._wrong = str(error)
                 stop.wait(AGAIN_S)
 
     def _hear(self, events: Subscriber) -> None:
@@ -87,7 +87,7 @@ class Pad:
     def _frames(self) -> Iterator[tuple[int, Frame]]:
         """Each frame at its time, with its counter; frames for which the machine was too slow are left out."""
         dt, start, stop = 1.0 / self.rate_hz, self._sender.start, self._sender.stop
-        counter, unheard, idle = 0, 0, None
+        counter, idle, sender = 0, None, self._sender
         while not stop.is_set():
             counter = max(counter + 1, int((time.monotonic() - start) / dt))
             stop.wait(max(start + counter * dt - time.monotonic(), 0.0))
@@ -98,6 +98,8 @@ class Pad:
             if idle is None or not presses:
                 idle = values if idle is None else idle + SEEN * (values - idle)
             felt = np.rint(values - idle).astype(int)
-            self._tell("frame", {"values": felt.ravel().tolist(), "heard": self._sender.unheard == unheard})
-            unheard = self._sender.unheard
+            self._tell("frame", {"values": felt.ravel().tolist(), "wrong": self._wrong})
+            sent, unheard = sender.sent, sender.unheard
             yield counter, Frame(counter * dt, values, touches)
+            if sender.sent > sent:
+                self._wrong = f"nobody listens on {self.to}" if sender.unheard > unheard else ""

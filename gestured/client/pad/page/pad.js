@@ -3,26 +3,27 @@
 const MESSAGE_MS = 16, STILL_MS = 100, TRAIL_MS = 700, SAMPLES = 60, SAID = 8, FULL = 1100; // counts of a firm touch
 const KEYS = { "\n": "Keep, go on", r: "Repeat", d: "Discard", y: "Keep all the same", p: "Pause" };
 const pad = at("pad"), down = new Map(), trail = [];
-const state = { seat: null, waiting: [], flying: false, frame: null, stream: new AbortController(), drawn: 0 };
+const state = { seat: null, waiting: [], flying: false, frame: null, stream: new AbortController(), drawn: 0, wrong: {} };
 
 function over(told) { state.stream.abort(); state.seat = null; status(told.reason, true); }
 
 function seat(told) {
   state.seat = told; state.waiting = []; down.clear();
+  state.wrong = { touch: "", frames: "", names: "" };
   at("lead").hidden = !told.keys;
   at("name").parentElement.hidden = told.keys;
   at("told").textContent = "";
-  sends();
+  found("touch", "");
 }
 
-function sends() {
-  const { grid, rate_hz, to, sensor } = state.seat;
-  status(`${grid.join(" × ")} at ${rate_hz} Hz, to ${to} as ${sensor}`, false);
+function found(by, wrong) { // says what is wrong with one part, as long as it is; else where the frames go
+  state.wrong[by] = wrong;
+  const { grid, rate_hz, to, sensor } = state.seat, first = Object.values(state.wrong).find(Boolean);
+  status(first ?? `${grid.join(" × ")} at ${rate_hz} Hz, to ${to} as ${sensor}`, Boolean(first));
 }
 
 function frame(told) {
-  if (!told.heard) status(`nobody listens on ${state.seat.to}`, true);
-  else if (state.frame && !state.frame.heard) sends();
+  found("frames", told.wrong);
   state.frame = told;
   plan();
 }
@@ -76,7 +77,7 @@ async function send() {
   state.flying = true;
   const begun = performance.now();
   const answer = await post("touch", { seat: state.seat.seat, sent: begun / 1000, samples: state.waiting.splice(0, SAMPLES) });
-  if (answer.error && state.seat) status(answer.error, true);
+  if (state.seat) found("touch", answer.error ?? "");
   await new Promise(then => setTimeout(then, begun + MESSAGE_MS - performance.now()));
   state.flying = false;
   send();
@@ -133,5 +134,5 @@ for (const kind of ["pointerdown", "pointermove"]) pad.addEventListener(kind, to
 for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(kind, left);
 pad.addEventListener("contextmenu", e => e.preventDefault());
 addEventListener("resize", plan);
-const kinds = { seat, frame, event, told, over, gone: gone => status(gone.reason, true), back: () => state.seat && sends() };
+const kinds = { seat, frame, event, told, over, gone: gone => found("names", gone.reason), back: () => found("names", "") };
 enter().then(() => listen("stream", state.stream.signal, kinds, reason => status(reason, true)), error => status(error.message, true));
