@@ -242,18 +242,28 @@ def test_the_page_is_told_why_frames_are_not_heard_for_as_long_as_they_are_not(
                     pass
 
 
-def test_a_message_that_was_lost_is_said_until_one_arrives(udp: socket.socket, browser: Browser) -> None:
-    with served(Address(*udp.getsockname())) as (_, page):
+def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, browser: Browser) -> None:
+    """Its connection is cut, or cut within the answer, or nothing comes."""
+    with served(Address(*udp.getsockname())) as (server, page):
         browser.call("Page.navigate", url=page.whole)
         browser.until("typeof state === 'object' && state.drawn > 0")
         said = browser.run("at('state').textContent")
+        browser.run("timeout = AbortSignal.timeout; AbortSignal.timeout = ms => timeout.call(AbortSignal, ms / 20)")
+        browser.run("fetching = fetch")
         hand = Hand(browser)
-        browser.run("fetching = fetch; fetch = () => Promise.reject(new TypeError('cut'))")
-        hand.mouse(STILL, 0.1)
-        browser.until("at('state').classList.contains('gone')")
-        browser.run("fetch = fetching")
-        hand.let_go()
-        browser.until(f"at('state').textContent === {said!r} && !at('state').classList.contains('gone')")
+        for lost in (
+            "async () => { throw new TypeError('cut') }",
+            "async () => new Response('{')",
+            "(_, more) => new Promise((_, no) => { more.signal.onabort = () => no(more.signal.reason) })",
+        ):
+            hand.mouse(STILL, 0.1)
+            browser.until("Math.max(...state.frame.values) > 300")
+            browser.run(f"fetch = {lost}")
+            hand.let_go()
+            browser.until("at('state').classList.contains('gone')")
+            browser.run("fetch = fetching")
+            browser.until(f"at('state').textContent === {said!r} && !at('state').classList.contains('gone')")
+            assert not server.pad.contacts.down
 
 
 def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(serve, monkeypatch: pytest.MonkeyPatch) -> None:

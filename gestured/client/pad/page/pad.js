@@ -1,11 +1,13 @@
 "use strict";
 // The page of a pad: what touches it is told to the server, at most sixty times a second, one message after the other.
-const MESSAGE_MS = 16, STILL_MS = 100, TRAIL_MS = 700, SAMPLES = 60, SAID = 8, FULL = 1100; // counts of a firm touch
+const MESSAGE_MS = 16, STILL_MS = 100, LOST_MS = 2000, TRAIL_MS = 700, SAMPLES = 60, SAID = 8, FULL = 1100; // counts of a firm touch
 const KEYS = { "\n": "Keep, go on", r: "Repeat", d: "Discard", y: "Keep all the same", p: "Pause" };
 const pad = at("pad"), down = new Map(), trail = [];
 const state = { seat: null, waiting: [], flying: false, frame: null, stream: new AbortController(), drawn: 0, wrong: {} };
 
-function over(told) { state.stream.abort(); state.seat = null; status(told.reason, true); }
+function over(told) { state.stream.abort(); lost(told.reason); }
+
+function lost(reason) { state.seat = null; status(reason, true); }
 
 function seat(told) {
   state.seat = told; state.waiting = []; down.clear();
@@ -75,10 +77,13 @@ function tell(what) {
 async function send() {
   if (state.flying || !state.waiting.length || !state.seat) return;
   state.flying = true;
-  const begun = performance.now();
-  const answer = await post("touch", { seat: state.seat.seat, sent: begun / 1000, samples: state.waiting.splice(0, SAMPLES) });
-  if (state.seat) found("touch", answer.error ?? "");
-  await new Promise(then => setTimeout(then, begun + MESSAGE_MS - performance.now()));
+  const begun = performance.now(), { seat } = state.seat, samples = state.waiting.splice(0, SAMPLES);
+  const answer = await post("touch", { seat, sent: begun / 1000, samples }, AbortSignal.timeout(LOST_MS));
+  if (state.seat?.seat === seat) {
+    if (answer.lost) state.waiting.unshift(...samples); // else a finger that has left would touch the pad for ever
+    found("touch", answer.error ?? "");
+  }
+  await new Promise(then => setTimeout(then, begun + (answer.lost ? STILL_MS : MESSAGE_MS) - performance.now()));
   state.flying = false;
   send();
 }
@@ -135,4 +140,4 @@ for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) pad.add
 pad.addEventListener("contextmenu", e => e.preventDefault());
 addEventListener("resize", plan);
 const kinds = { seat, frame, event, told, over, gone: gone => found("names", gone.reason), back: () => found("names", "") };
-enter().then(() => listen("stream", state.stream.signal, kinds, reason => status(reason, true)), error => status(error.message, true));
+enter().then(() => listen("stream", state.stream.signal, kinds, lost), error => status(error.message, true));

@@ -2,7 +2,7 @@
 // What the pages of gestured share. What comes from a server is written by textContent alone: a name is never markup.
 const at = id => document.getElementById(id);
 const CIVIDIS = ["#00204d", "#31446b", "#666970", "#958f78", "#cab969", "#ffea46"];
-const SILENT_MS = 12000;
+const SILENT_MS = 12000, MUTE = "the program that serves this page does not answer: does it still run?";
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const door = { secret: sessionStorage.getItem("secret") ?? "", token: location.hash.slice(1) };
 let stops; // colours from nothing, which is the page's own ground, to the most
@@ -26,9 +26,9 @@ async function ask(path, more) {
   return fetch(path, { ...more, headers: { "X-Gestured-Token": door.secret, ...more?.headers } });
 }
 
-async function post(path, what) {
-  return ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what) })
-    .then(r => r.json(), error => ({ error: String(error) }));
+async function post(path, what, signal) {
+  return ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what), signal })
+    .then(r => r.json()).catch(() => ({ error: MUTE, lost: true }));
 }
 
 async function enter() { // by the token, else by the secret that this tab has kept; throws the reason where the door is closed
@@ -63,7 +63,7 @@ async function listen(path, signal, hear, lost) { // server-sent events; EventSo
       }
     } catch { /* it has gone, or something else is looked at */ }
     if (signal.aborted) return;
-    lost(busy || "the program that serves this page does not answer: does it still run?");
+    lost(busy || MUTE);
     await new Promise(again => setTimeout(again, 1000));
   }
 }
