@@ -8,6 +8,7 @@ import socket
 from email.message import Message
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -89,6 +90,17 @@ def test_who_takes_his_time_is_hung_up_on_and_who_looks_is_not(view: Page, monke
         assert slow.recv(1) == b""
     for _ in range(2):
         stream.until("sensors")
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError, KeyError])
+def test_of_a_bug_there_is_a_traceback_and_of_a_browser_that_has_gone_there_is_none(
+    view: Page, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: type[Exception]
+) -> None:
+    monkeypatch.setattr(Handler, "stream", Mock(side_effect=error))
+    with pytest.raises(ConnectionResetError):
+        view.come_in().ask("/stream")
+    assert ("KeyError" in capsys.readouterr().err) == (error is KeyError)
+    assert view.ask("/")[0] == 200
 
 
 @pytest.mark.parametrize("target", ["http://[", "http://[x]/", "//[::1/stream", "*"])

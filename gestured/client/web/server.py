@@ -2,6 +2,7 @@
 
 import json
 import socket
+import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -91,7 +92,9 @@ class Server(ThreadingHTTPServer):
         self._strangers.pop(request, None)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Do nothing, since the usual error is that a browser has gone."""
+        """Print the traceback of a bug, but not that a browser has gone."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class Handler(BaseHTTPRequestHandler):
