@@ -368,6 +368,15 @@ def test_pause_step_back_and_keys(sensor: Sensor, browser: Browser) -> None:
     assert browser.complaints() == []
 
 
+def test_a_picture_that_stands_still_follows_the_colours_of_the_page(sensor: Sensor, browser: Browser) -> None:
+    browser.colours("light")
+    browser.run("colours(); pause(true)")
+    drawn = "[...at('matrix').getContext('2d').getImageData(2, 2, 1, 1).data].slice(0, 3)"
+    browser.until(f"!state.dirty && {drawn}.every(part => part > 200)")
+    browser.colours("dark")
+    browser.until(f"{drawn}.every(part => part < 100)")
+
+
 def test_a_switch_silences_a_sensor_after_a_question(sensor: Sensor, real: Daemon, browser: Browser) -> None:
 
     def says(word: str, hears: bool) -> None:

@@ -129,7 +129,7 @@ function taxels(g, values, columns, side, left, least, full) {
 }
 
 colours();
-dark.addEventListener("change", colours);
+dark.addEventListener("change", () => { colours(); plan(); });
 addEventListener("hashchange", () => { // another address of this page, as of a program that was started again
   if (location.hash && !at(location.hash.slice(1))) location.reload();
 });
