@@ -163,6 +163,8 @@ def test_an_answer_is_drawn_where_it_was_and_a_zone_is_pulled_up_with_the_mouse(
     browser.run("document.getElementById('copy').click()")
     browser.until("document.getElementById('zone-note').textContent.startsWith('Copied')")
     assert browser.run("window.copied") == lines
+    browser.run("at('zone-name').value = 'left'")
+    assert pull((0.6, 0.9), (1.0, 0.25), (1.0, 0.25)) == "A zone is named left already."
     assert pull((0.3, 0.9), (0.8, 0.25), (0.8, 0.25)) == "It overlaps left: zones must share no place."
     assert browser.complaints() == []
 

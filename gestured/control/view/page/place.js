@@ -48,6 +48,7 @@ function tellZone() {
   at("zone").textContent = `[sensors.${state.sensor}.zones.${name}]\nat = [${zone.join(", ")}]\n`;
   const other = Object.keys(over.zones).filter(key => [0, 1].every(k => over.zones[key][k] < zone[k + 2] && zone[k] < over.zones[key][k + 2]));
   at("zone-note").textContent = other.length ? `It overlaps ${other.join(", ")}: zones must share no place.`
+    : Object.hasOwn(over.zones, name) ? `A zone is named ${name} already.`
     : /^[\w-]{1,64}$/.test(name) ? "" : "A name has 1 to 64 of A-Z, a-z, 0-9, _ and -.";
 }
 
