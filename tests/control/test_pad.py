@@ -27,7 +27,7 @@ from gestured.simulator import GESTURES, SimulatedSensor
 from gestured.simulator.live import LiveTextile
 from tests.control.browser import Browser
 from tests.control.pages import Page, Stream
-from tests.sockets import free_address
+from tests.sockets import FakeDaemon, free_address
 
 Way = Callable[[float], tuple[float, float]]  # share of the time -> x, y, from the bottom-left corner
 
@@ -233,13 +233,12 @@ def test_the_page_is_told_why_frames_are_not_heard_for_as_long_as_they_are_not(
     monkeypatch.setattr("gestured.client.pad.pad.AGAIN_S", 0.05)
     with served() as (_, page):
         stream, _ = seat(page.come_in())
-        for wrong in ("nobody listens on", "cannot send to", "nobody listens on"):
-            with monkeypatch.context() as patch:
-                if wrong == "cannot send to":
-                    unreachable = Mock(side_effect=OSError(errno.EHOSTUNREACH, "No route to host"))
-                    patch.setattr("gestured.client.sensor.sent_after_refusal", unreachable)
-                while not stream.until("frame")[1]["wrong"].startswith(wrong):
-                    pass
+        wrong(stream, "nobody listens on")
+        with monkeypatch.context() as patch:
+            unreachable = Mock(side_effect=OSError(errno.EHOSTUNREACH, "No route to host"))
+            patch.setattr("gestured.client.sensor.sent_after_refusal", unreachable)
+            wrong(stream, "cannot send to")
+        wrong(stream, "nobody listens on")
 
 
 def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, browser: Browser) -> None:
@@ -266,22 +265,39 @@ def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, brow
             assert not server.pad.contacts.down
 
 
-def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(serve, monkeypatch: pytest.MonkeyPatch) -> None:
+def wrong(stream: Stream, words: str) -> None:
+    """Wait for a frame that says so; of "", that nothing is wrong."""
+    while (said := stream.until("frame")[1]["wrong"]) != words and (not words or words not in said):
+        pass
+
+
+def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(
+    serve, udp: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("gestured.client.pad.server.SILENT_S", 1.5)  # it tells its status each second
     daemon = serve()
-    pad = Pad(daemon.address, "pad", (9, 9), 15.0)
+    pad = Pad(Address(*udp.getsockname()), "pad", (9, 9), 15.0)
     with PadServer(Address("127.0.0.1", 0), pad, "gesturectl pad").serve(daemon.socket) as server:
         stream, _ = seat(Page(server.page).come_in())
         daemon.signal(signal.SIGSTOP)
         try:
-            for _ in range(2):  # a page that is opened meanwhile is told, too
-                assert "hangs" in stream.until("gone")[1]["reason"]
+            wrong(stream, "hangs")
         finally:
             daemon.signal(signal.SIGCONT)
-        stream.until("back")
+        wrong(stream, "")
         daemon.stop()
-        while "no daemon on" not in stream.until("gone")[1]["reason"]:
-            pass  # on a busy machine it was late before
+        wrong(stream, "no daemon on")
+
+
+def test_a_page_that_is_opened_later_is_told_why_there_will_be_no_names(udp: socket.socket, fake: FakeDaemon) -> None:
+    """As to who may not read the daemon's events."""
+    pad = Pad(Address(*udp.getsockname()), "pad", (9, 9), 15.0)
+    with PadServer(Address("127.0.0.1", 0), pad, "gesturectl pad").serve(fake.path) as server:
+        fake.accept({"type": "what no daemon says"})
+        while fake.client.recv(4096):  # until it is hung up
+            pass
+        stream, _ = seat(Page(server.page).come_in())
+        wrong(stream, "does not speak protocol")
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0", "0:0"])

@@ -38,6 +38,7 @@ class Pad:
         self._textile = LiveTextile(sensor, time.time_ns())
         self._sender = Sensor(to, Form(name))
         self._wrong = ""  # why the last frame was not sent or not heard
+        self._unnamed = ""  # why there are no names
 
     def begin(self, tell: Tell, events: Subscriber | None = None) -> None:
         """Send frames from now on; `tell` gets each frame and each event for the page.
@@ -63,24 +64,20 @@ class Pad:
                 stop.wait(AGAIN_S)
 
     def _hear(self, events: Subscriber) -> None:
-        gone = False
         while not self._sender.stop.is_set():
             try:
                 event = next(events)
             except TimeoutError:
-                gone = True
                 hangs = f"the daemon on {events.path} hangs, or the machine is very busy"
                 absent = f"no daemon on {events.path}: start gestured, or name its --socket"
-                self._tell("gone", {"reason": f"No names: {hangs if events.connected else absent}"})
+                self._unnamed = f"No names: {hangs if events.connected else absent}"
             except StopIteration:
                 return
             except GesturedError as error:
-                self._tell("gone", {"reason": str(error)})
+                self._unnamed = f"No names: {error}"
                 return
             else:
-                if gone:
-                    gone = False
-                    self._tell("back", {})
+                self._unnamed = ""
                 if event["type"] != "status":
                     self._tell("event", event)
 
@@ -98,7 +95,7 @@ class Pad:
             if idle is None or not presses:
                 idle = values if idle is None else idle + SEEN * (values - idle)
             felt = np.rint(values - idle).astype(int)
-            self._tell("frame", {"values": felt.ravel().tolist(), "wrong": self._wrong})
+            self._tell("frame", {"values": felt.ravel().tolist(), "wrong": self._wrong or self._unnamed})
             sent, unheard = sender.sent, sender.unheard
             yield counter, Frame(counter * dt, values, touches)
             if sender.sent > sent:

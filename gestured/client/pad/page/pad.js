@@ -11,7 +11,7 @@ function lost(reason) { state.seat = null; status(reason, true); }
 
 function seat(told) {
   state.seat = told; state.waiting = []; down.clear();
-  state.wrong = { touch: "", frames: "", names: "" };
+  state.wrong = { touch: "", frames: "" };
   at("lead").hidden = !told.keys;
   at("name").parentElement.hidden = told.keys;
   at("told").textContent = "";
@@ -139,5 +139,5 @@ for (const kind of ["pointerdown", "pointermove"]) pad.addEventListener(kind, to
 for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(kind, left);
 pad.addEventListener("contextmenu", e => e.preventDefault());
 addEventListener("resize", plan);
-const kinds = { seat, frame, event, told, over, gone: gone => found("names", gone.reason), back: () => found("names", "") };
+const kinds = { seat, frame, event, told, over };
 enter().then(() => listen("stream", state.stream.signal, kinds, lost), error => status(error.message, true));
