@@ -150,6 +150,8 @@ def test_another_site_gets_nothing(view: Page) -> None:
     evil = {"Origin": "http://evil.example"}
     assert view.ask("/open", "POST", {}, X_Gestured_Token=view.token, **evil)[0] == 403  # it is not used up
     view.come_in()
+    status, _, body = view.ask("/", Host="localhost:1")  # as of a forwarded port of another number
+    assert status == 403 and f"http://{view.address}/" in body.decode()
     assert view.ask("/", **evil)[0] == view.ask("/stream", **evil)[0] == view.ask("/flag", "POST", {}, **evil)[0] == 403
 
 

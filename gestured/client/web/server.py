@@ -121,7 +121,7 @@ class Handler(BaseHTTPRequestHandler):
             self.refuse(HTTPStatus.BAD_REQUEST, "no address")
             return
         if not at_home(self.headers, self.server.address):
-            self.refuse(HTTPStatus.FORBIDDEN, "another host, or another site's page")
+            self.refuse(HTTPStatus.FORBIDDEN, self._elsewhere)
         elif (file := self.server.files.get(where.path)) is not None:  # no file holds private data
             self._answer(HTTPStatus.OK, f"{KINDS[file.suffix]}; charset=utf-8", file.read_bytes())
         elif where.path != "/stream":
@@ -142,7 +142,7 @@ class Handler(BaseHTTPRequestHandler):
             fits, what = False, None
         self.close_connection |= not fits  # the rest of the body must not be read as a request
         if not at_home(self.headers, self.server.address):
-            said: Said = HTTPStatus.FORBIDDEN, {"error": "another host, or another site's page"}
+            said: Said = HTTPStatus.FORBIDDEN, {"error": self._elsewhere}
         elif self.path == "/open" and (secret := door.open(self.headers)) is not None:
             said = HTTPStatus.OK, {"secret": secret}
         elif not self._known():
@@ -169,6 +169,10 @@ class Handler(BaseHTTPRequestHandler):
         with suppress(OSError):  # the browser has gone
             while (what := outbox.take(ALIVE_S)) is not None:
                 self.wfile.write(what)
+
+    @property
+    def _elsewhere(self) -> str:
+        return f"The page is at http://{self.server.address}/ alone, and no other site's page may lead here: type it."
 
     @property
     def _closed(self) -> str:
