@@ -21,6 +21,10 @@ from tests.control.pages import Page, viewing
 from tests.daemon.harness import Daemon, Frame, Sensor
 from tests.documents.blocks import blocks
 
+FRAME = {
+    "time": 100.0, "grid": [9, 9], "centroid": None, "values": None, "phase": "IDLE", "noise": 1.0,
+    "activity": 1.0, "on": 6.0, "off": 3.0, "bad": [],
+}  # fmt: skip
 SHOWN = "document.getElementById('state')?.textContent.startsWith('gestured ')"
 
 
@@ -312,12 +316,28 @@ def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
 ) -> None:
     browser.call("Page.navigate", url=view.whole)
     browser.until("typeof frame === 'function' && state.stream !== null")
-    first = {"time": 100.0, "grid": [9, 9], "centroid": None, "values": None, "phase": "IDLE", "noise": 1.0}
-    first |= {"activity": 1.0, "on": 6.0, "off": 3.0, "bad": []}
-    frames = [first, first | {"time": 101.0}, first | {"time": 102.0} | then]
+    frames = [FRAME, FRAME | {"time": 101.0}, FRAME | {"time": 102.0} | then]
     kept = browser.run(f"state.frames = []; {json.dumps(frames)}.map(f => frame(f) ?? state.frames.length)")
     assert kept == [1, 2, 1]
     browser.run("new Promise(requestAnimationFrame)")
+    assert browser.complaints() == []
+
+
+def test_a_picture_is_frozen_for_as_long_as_one_pauses(view: Page, browser: Browser) -> None:
+    """However many frames come meanwhile; they are kept for a while before and after it, in a bounded number."""
+    browser.call("Page.navigate", url=view.whole)
+    browser.until("typeof frame === 'function' && state.stream !== null")
+    came = f"(...times) => times.forEach(time => frame({{ ...{json.dumps(FRAME)}, time }}))"
+    browser.run(f"state.stream.abort(); state.frames = []; came = {came}")
+    browser.run("came(100, 101); pause(true); came(102, 140, 160)")
+    assert browser.run("state.frames[shown()].time") == 101
+    assert browser.run("state.frames.map(f => f.time)") == [100, 101, 102]
+    browser.run("new Promise(requestAnimationFrame).then(() => plan()).then(() => new Promise(requestAnimationFrame))")
+    assert browser.run("document.getElementById('ago').textContent") == "59.00 s ago"
+    browser.run("at('pause').click(); came(161)")
+    assert browser.run("state.frames.map(f => f.time)") == [161]
+    browser.run("pause(true); open('another'); came(300)")  # nothing is left of what was frozen
+    assert not browser.run("state.paused")
     assert browser.complaints() == []
 
 

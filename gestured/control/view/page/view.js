@@ -6,7 +6,7 @@ const NO_RECORDER = "To flag, start the daemon with --flight-recorder MIB: it ke
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const OWN_KEYS = { text: /./, "select-one": /./, range: /^Arrow/, checkbox: / /, submit: / / }; // by type of what has the focus
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
-const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false, sliders: [] };
+const state = { stream: null, sensor: "", frames: [], full: 0, time: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false, sliders: [] };
 const counted = { since: Date.now() / 1000, times: {} }; // by sensor and type: when contacts were answered, s
 
 
@@ -19,6 +19,7 @@ const kinds = { sensors, frame, event, touch: told => state.sliders.forEach(foll
 function open(sensor) {
   if (state.stream) state.stream.abort();
   state.frames = []; state.full = 0; state.sensor = sensor; state.lies = false;
+  pause(false);
   rest();
   forget();
   headline("…", "guess", "no contact yet");
@@ -95,9 +96,11 @@ function row(cells) {
 
 function frame(told) {
   const frames = state.frames, last = frames.at(-1);
-  if (last && (told.time < last.time || String(told.grid) !== String(last.grid))) frames.length = 0; // the clock was set back, or another grid
-  frames.push(told);
-  while (frames.length && frames[0].time < told.time - KEPT_S) frames.shift();
+  if (last && (told.time < state.time || String(told.grid) !== String(last.grid))) { frames.length = 0; pause(false); } // the clock was set back, or another grid
+  state.time = told.time;
+  const middle = state.paused ? state.moment : told.time; // what is frozen stays
+  if (told.time <= middle + KEPT_S) frames.push(told);
+  while (frames.length && frames[0].time < middle - KEPT_S) frames.shift();
   if (told.values) {
     told.peak = Math.max(...told.values); // once for each frame: half a minute of a large grid has millions of counts
     const most = frames.filter(f => f.centroid && f.values).map(f => f.peak).sort((a, b) => a - b);
@@ -172,9 +175,8 @@ function draw() {
   at("full").textContent = `${full} counts`;
   matrix(now, i, full);
   chart(i);
-  const last = state.frames[state.frames.length - 1].time;
-  if (state.paused) at("when").value = now.time - last;
-  at("ago").textContent = state.paused ? `${(last - now.time).toFixed(2)} s ago` : "now";
+  if (state.paused) at("when").value = now.time - state.time;
+  at("ago").textContent = state.paused ? `${(state.time - now.time).toFixed(2)} s ago` : "now";
   state.drawn++;
 }
 
@@ -270,11 +272,11 @@ function chart(i) {
 // What the reader does.
 
 function pause(on) {
-  const last = state.frames[state.frames.length - 1];
-  state.paused = on;
-  state.moment = last ? last.time : 0;
-  at("pause").setAttribute("aria-pressed", String(on));
-  if (!on) at("when").value = 0;
+  const last = state.frames.at(-1);
+  state.paused = on && last !== undefined;
+  state.moment = last?.time;
+  at("pause").setAttribute("aria-pressed", String(state.paused));
+  if (!state.paused) at("when").value = 0;
   plan();
 }
 
@@ -299,11 +301,10 @@ at("pause").onclick = () => pause(!state.paused);
 at("back").onclick = () => step(-1);
 at("on").onclick = () => step(1);
 at("when").oninput = () => {
-  const last = state.frames[state.frames.length - 1];
-  if (!last) return;
+  if (!state.frames.length) return;
   const ago = Number(at("when").value);
   if (!state.paused) pause(true);
-  state.moment = last.time + ago;
+  state.moment = state.time + ago;
   plan();
 };
 at("flag").onclick = e => { if (e.detail < 2) act("flag", { note: at("note").value }); }; // a double click is one flag
