@@ -1,6 +1,7 @@
 """`gesturectl export`: write the frames of a tape as .npz."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.client.values import npz
 from gestured.core.errors import RecordingError
-from gestured.core.frames import Frame
+from gestured.core.frames import Frame, Touch
+from gestured.core.mounting import Mounting
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
 from gestured.record.recordings import Recordings, touch_arrays
@@ -23,7 +25,8 @@ def add(commands: Commands) -> None:
         "export",
         help="write a recording as .npz",
         description="Write the frames of a recording as .npz, one session a sensor, with the gestures that the\n"
-        "daemon recognised as its events. Sensors of one file have one grid.",
+        "daemon recognised as its events. A sensor that is mounted turned, mirrored or inverted is written as a\n"
+        "person in front of it sees it. Sensors of one file have one grid.",
         epilog="example:\n  gesturectl export drive.mcap drive.npz --sensor armrest",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
@@ -46,7 +49,11 @@ def run(args: argparse.Namespace) -> int:
 def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recordings]:
     """The sensors of a tape, or the one named `sensor`, and a session of each. Raises RecordingError."""
     found, known = opened(path)
-    sessions = {name: used for name, used in frames_used(found, known.scene).items() if sensor in (None, name)}
+    sessions = {
+        name: [_seen(frame, known.scene.setup(name).mounting) for frame in used]
+        for name, used in frames_used(found, known.scene).items()
+        if sensor in (None, name)
+    }
     if not sessions:
         raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
     grids = {name: each[0].values.shape for name, each in sessions.items()}
@@ -54,6 +61,18 @@ def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recor
         said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())
         raise RecordingError(f"{path}: sensors of several grids ({said}), choose one with --sensor")
     return list(sessions), _recordings(sessions, found)
+
+
+def _seen(frame: Frame, mounting: Mounting) -> Frame:
+    """A frame and its touches as a person in front of the sensor sees them, since the gestures' names say that."""
+    touches = []
+    for touch in frame.touches:
+        rows, columns = frame.values.shape
+        x, y = columns - 1 - touch.x if mounting.mirror else touch.x, touch.y
+        for _ in range(mounting.rotate // 90):
+            x, y, rows, columns = y, columns - 1 - x, columns, rows
+        touches.append(Touch(touch.id, x, y))
+    return replace(frame, values=mounting.frame(frame.values), touches=tuple(touches))
 
 
 def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:

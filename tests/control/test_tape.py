@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.client.sensor import Form
 from gestured.control.diff import Answer, Difference, differences
 from gestured.control.record import Keeper
 from gestured.core.errors import RecordingError
+from gestured.core.frames import Frame, Touch
+from gestured.core.mounting import Mounting
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import gestures
@@ -230,6 +233,30 @@ def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path:
     status, _, err = run("export", path, path)
     assert status == 2 and f"OUT: '{path}': expected a file *.npz\n" in err
     assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "mounted", [{}, {"rotate": 90}, {"rotate": 180, "invert": True}, {"rotate": 270, "mirror": True}]
+)
+def test_an_export_is_what_a_person_in_front_of_the_sensor_sees(
+    run, tmp_path: Path, mounted: dict[str, object]
+) -> None:
+    settings = {"model": "cnn_lstm", "fallback": [], "grid": [3, 5], "sensors": {"arm": mounted}}
+    told = {"settings": settings, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
+    mounting = Mounting(**mounted)
+    sent = np.arange(15).reshape(3, 5)
+    strongest = 0.0 if mounting.invert else 4.0, 2.0 if mounting.invert else 0.0  # x to the right and y upward, as sent
+    with tape_writer.Writer(tmp_path / "tape.mcap", told, 1 << 20) as writer:
+        for n in range(3):
+            frame = Frame(0.0, sent, (Touch(7, *strongest),))
+            writer.packet(10**18 + n * 10**8, "127.0.0.1:5", Form("arm", "ints").packet(frame, n, 0.0))
+    status, _, err = run("export", tmp_path / "tape.mcap", tmp_path / "out.npz")
+    assert (status, err) == (0, "")
+    found = recording.read(tmp_path / "out.npz")
+    assert (found.frames == mounting.frame(sent)).all() and len(found.frames) == 3
+    (finger,) = next(found.stream(0)).touches
+    rows, columns = mounting.shape(3, 5)
+    assert divmod(int(found.frames[0].argmax()), columns) == (rows - 1 - finger.y, finger.x)
 
 
 def test_a_tape_of_gestures_that_the_model_lacks_is_one_sentence(run, tmp_path: Path) -> None:
