@@ -11,6 +11,7 @@ from gestured.control.show import clock
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets are at most so far apart are about the same contact
+OPEN = "open"  # stands for the answer to a contact before whose answer the recording ends
 CONFIDENCE_TOLERANCE = 0.05  # a baseline that was learned at another moment may change a confidence by so much
 
 Line = Mapping[str, Any]  # of the event stream, with the recording's times
@@ -66,11 +67,12 @@ class Recorded:
         # A daemon that knew the sensor before the recording began has answered contacts that a replay cannot answer.
         usable = [answer for answer in before if knew(answer.sensor, answer.onset)]
         after = [answer for answer in answers(lines) if knew(answer.sensor, answer.onset)]
-        return f"{len(usable)} recorded answers", len(before) - len(usable), differences(usable, after)
+        count = sum(answer.answer != OPEN for answer in usable)
+        return f"{count} recorded answers", len(before) - len(usable), differences(usable, after)
 
 
 def answers(lines: Iterable[Line]) -> list[Answer]:
-    """The answers among the lines of an event stream."""
+    """The answers among the lines of an event stream; last those to contacts that are still open at its end."""
     onsets: dict[tuple[str, int], float] = {}
     found = []
     for line in lines:
@@ -79,10 +81,11 @@ def answers(lines: Iterable[Line]) -> list[Answer]:
             onsets[key] = line["onset"]
         elif line["type"] in ("gesture", "unknown"):
             name = line.get("gesture", "unknown")
+            onsets.pop(key, None)
             found.append(Answer(key[0], line["onset"], name, line["confidence"]))
         elif line["type"] == "cancelled" and key in onsets:
-            found.append(Answer(key[0], onsets[key], f"cancelled: {line['reason']}", None))
-    return found
+            found.append(Answer(key[0], onsets.pop(key), f"cancelled: {line['reason']}", None))
+    return found + [Answer(sensor, onset, OPEN, None) for (sensor, _), onset in onsets.items()]
 
 
 def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Difference]:
@@ -97,7 +100,7 @@ def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Diffe
         new = min(near, key=lambda answer: abs(answer.onset - old.onset), default=None)
         if new is not None:
             rest.remove(new)
-        if new is None or not _alike(old, new):
+        if old.answer != OPEN and (new is None or not _alike(old, new)):
             found.append(Difference(old, new))
     return [*found, *(Difference(None, new) for new in rest)]
 

@@ -107,6 +107,19 @@ def test_a_daemon_to_which_it_is_sent_answers_as_the_recorded_one_did(recorded, 
         assert [event["gesture"] for event in answers] == ["swipe_left", "one_tap", "swipe_up"]
 
 
+def test_a_contact_before_whose_answer_a_recording_ends_is_no_difference(recorded, run, daemon, tmp_path: Path) -> None:
+    path, _ = recorded(gestures(daemon, "end", "left", "tap"))
+    found = tape_reader.read(path)
+    last = max(n for n, event in enumerate(found.events) if event["type"] == "onset")
+    with tape_writer.Writer(tmp_path / "ends.mcap", found.scene, 1 << 30) as writer:
+        for packet in found.packets:
+            writer.packet(packet.t_ns, str(packet.source), packet.data)
+        for event in found.events[: last + 1]:
+            writer.event(found.packets[-1].t_ns, event)
+    status, out, err = run("replay", tmp_path / "ends.mcap", "--diff", "--model", found.scene["settings"]["model"])
+    assert (status, out) == (0, "") and "1 recorded answers, 0 differences" in err
+
+
 def test_foreign_names_in_a_recording_are_shown_and_not_obeyed(recorded, run, daemon, tmp_path: Path) -> None:
     path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
     found = tape_reader.read(path)
