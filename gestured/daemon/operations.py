@@ -141,8 +141,8 @@ class Operations:
         """Stream what the flight recorder holds, then `{"type":"end"}`."""
         if not self._parts.taps.ring_bytes:
             raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
-        held = self._parts.taps.flight()
-        return scene(self._parts) | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',))
+        held, told = self._parts.taps.flight(), scene(self._parts)
+        return told | {"lines": len(held)}, chain(as_lines(held, told["epoch_ns"]), (b'{"type":"end"}\n',))
 
     def _heard(self, sensor: str | None = None) -> dict[str, Reading]:
         """The sensors that were heard, by name. Raises Refusal if `sensor` is named and none of them."""

@@ -7,14 +7,13 @@ flight recorder is set. Lines are sent to a live tap only after a short while, s
 
 import asyncio
 import base64
-import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from gestured.core import messages
-from gestured.core.events import Event, Status, Touch
+from gestured.core.events import Event, Gate, Status, Touch
 from gestured.core.hub import REMEMBERED
 from gestured.core.messages import json_line
 from gestured.core.owner import Source
@@ -22,10 +21,10 @@ from gestured.daemon.request import Connection
 
 KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
+EVENT_BYTES = 1500  # of memory for an event, with the scores and the place of a gesture
 SOON_S = 0.025  # how long a packet's line waits, so that other sensors' packets that came with it are answered first
 TURN_LINES = 32  # lines that are made and sent before the loop serves frames again
-GATE = b'{"type":"gate"'  # how the line of a `Gate` begins
-Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
+Remembered = tuple[int, Source, bytes] | Event  # a packet with its time in ns (monotonic), or an event
 
 
 class Taps:
@@ -40,8 +39,8 @@ class Taps:
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, packet or line
         self.held_bytes = 0  # in the ring
         self._epoch_ns = 0  # of the live taps
-        # By sensor, the latest last: the line of the `Gate` that holds at the beginning of the ring.
-        self._gates: dict[str, bytes] = {}
+        # By sensor, the latest last: the `Gate` that holds at the beginning of the ring.
+        self._gates: dict[str, Gate] = {}
 
     @property
     def active(self) -> bool:
@@ -72,7 +71,7 @@ class Taps:
         """Take packets that were served together at `now` (monotonic s)."""
         t_ns = round(now * 1e9)
         for packet, source in waiting:
-            self._remember(t_ns, len(packet), (t_ns, source, packet))
+            self._remember(t_ns, len(packet) + OVERHEAD_BYTES, (t_ns, source, packet))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Take an event, as a sink. The status and a test are left out, since no packet led to them.
@@ -80,8 +79,7 @@ class Taps:
         Touch events are left out as well, since the packets say the same.
         """
         if self.active and not test and not isinstance(event, Status | Touch):
-            line = messages.to_json(event, self.epoch_ns / 1e9)
-            self._remember(time.monotonic_ns(), len(line), line)
+            self._remember(time.monotonic_ns(), EVENT_BYTES, event)
 
     def flush(self) -> None:
         """Stream now all that waits."""
@@ -89,7 +87,7 @@ class Taps:
             self._stream()
 
     def flight(self) -> deque[Remembered]:
-        """The content of the ring, oldest first: the packets themselves, not copies of them."""
+        """The content of the ring, oldest first: packets and events themselves, not copies of them."""
         self._forget(time.monotonic_ns())
         return deque((*self._gates.values(), *(what for _, _, what in self._ring)))
 
@@ -108,8 +106,8 @@ class Taps:
             if self._timer is None:
                 self._timer = asyncio.get_running_loop().call_later(SOON_S, self._turn)
         if self.ring_bytes:
-            self._ring.append((t_ns, size + OVERHEAD_BYTES, what))
-            self.held_bytes += size + OVERHEAD_BYTES
+            self._ring.append((t_ns, size, what))
+            self.held_bytes += size
             self._forget(t_ns)
 
     def _turn(self) -> None:
@@ -119,7 +117,7 @@ class Taps:
 
     def _stream(self) -> None:
         """Send the next few lines to all live taps, in one write each, since a write for each line costs too much."""
-        lines = list(islice(as_lines(self._waiting), TURN_LINES))
+        lines = list(islice(as_lines(self._waiting, self._epoch_ns), TURN_LINES))
         text = b"".join(lines)
         for connection in self._live:
             connection.send(text, lines=len(lines))
@@ -129,23 +127,23 @@ class Taps:
         while self._ring and (self.held_bytes > self.ring_bytes or self._ring[0][0] < oldest):
             _, size, what = self._ring.popleft()
             self.held_bytes -= size
-            if isinstance(what, bytes) and what.startswith(GATE):
-                sensor = json.loads(what)["sensor"]
-                self._gates.pop(sensor, None)
-                self._gates[sensor] = what
+            if isinstance(what, Gate):
+                self._gates.pop(what.sensor, None)
+                self._gates[what.sensor] = what
                 if len(self._gates) > REMEMBERED:  # a peer chooses the names of sensors
                     del self._gates[next(iter(self._gates))]
 
 
-def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:
+def as_lines(remembered: deque[Remembered], epoch_ns: int) -> Iterator[bytes]:
     """Packets and events as lines of the control socket. Each is taken out of `remembered`, to free its memory.
 
-    A packet's line has its time in ns (monotonic), its source, and its bytes as base64.
+    A packet's line has its time in ns (monotonic), its source, and its bytes as base64. Times of events are made with
+    `epoch_ns`, which the reader adds to those of packets, since the wall clock may have been set after the event.
     """
     while remembered:
         what = remembered.popleft()
-        if isinstance(what, bytes):
-            yield what
+        if not isinstance(what, tuple):
+            yield messages.to_json(what, epoch_ns / 1e9)
         else:
             t_ns, source, packet = what
             data = base64.b64encode(packet).decode()

@@ -27,7 +27,7 @@ from gestured.daemon.merge import load_settings
 from gestured.daemon.service import Service
 from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp, name_of
 from gestured.daemon.status import healthy, overall, status
-from gestured.daemon.tap import Taps
+from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.udp import Receiver
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
@@ -113,8 +113,17 @@ def test_the_flight_recorder_knows_what_the_latest_sensors_listen_to_and_no_more
     taps = Taps(1000)
     for n in range(REMEMBERED + 100):
         taps.publish(Gate(f"s{n}", False, (), None, 0.0), 0.0)
-    told = [json.loads(line)["sensor"] for line in taps.flight()]
+    told = [gate.sensor for gate in taps.flight()]
     assert len(told) <= REMEMBERED + 10 and told[-1] == f"s{REMEMBERED + 99}"
+
+
+def test_what_the_flight_recorder_holds_has_one_clock_though_the_wall_clock_was_set(monkeypatch) -> None:
+    taps, now, wall = Taps(10_000), time.monotonic(), time.time_ns
+    taps.publish(Gate("arm", True, (), now + 5.0, now), time.time() - now)
+    taps.packets([(b"frame", ("127.0.0.1", 5))], now)
+    monkeypatch.setattr(time, "time_ns", lambda: wall() + 3600 * 10**9)
+    gate, packet = map(json.loads, as_lines(taps.flight(), epoch_ns := taps.epoch_ns))
+    assert gate["since"] == pytest.approx((packet["t_ns"] + epoch_ns) / 1e9, abs=1e-6)
 
 
 def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> None:
