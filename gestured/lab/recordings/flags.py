@@ -68,7 +68,7 @@ def add_recordings(command: Add) -> None:
     bring.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
     forget = command("forget", "remove a participant from files of recordings, and say which models learned from them",
                      "gestured-lab forget 07 recordings --dry-run")  # fmt: skip
-    forget.add_argument("participant", type=pseudonym, metavar="NAME", help="the pseudonym")
+    forget.add_argument("participant", metavar="NAME", help="as the recordings name the participant")
     forget.add_argument("paths", type=Path, nargs="+", metavar="DIR|FILE", help="files, and folders of .npz files")
     forget.add_argument("--models", type=Path, default=Path("models"), help="folder of the models to ask (models)")
     forget.add_argument("--yes", action="store_true", help="do not ask")

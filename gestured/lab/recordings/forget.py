@@ -1,10 +1,12 @@
 """`gestured-lab forget`: removes a participant from files of recordings, and says which models learned from them."""
 
 import argparse
+import os
 import sys
 import zipfile
 from collections.abc import Sequence
 from dataclasses import fields
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +22,10 @@ FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 
 def run(args: argparse.Namespace) -> int:
     """Say what would be removed, ask, and remove it. Exit status 1 if a file could not be looked into, or stays."""
-    name, unread = args.participant, []
+    name = args.participant
+    searched, unread = _files(args.paths)
     found: dict[Path, tuple[int, int]] = {}  # how many recordings are the participant's, and how many there are
-    for file in _files(args.paths):
+    for file in searched:
         try:
             subjects = read(file).subjects.astype(str)
             own = int((subjects == name).sum())
@@ -68,14 +71,24 @@ def _remove(file: Path, participant: str) -> None:
         file.unlink()
 
 
-def _files(paths: Sequence[Path]) -> list[Path]:
-    """The files, and those inside the folders, with temporary files that `write` leaves behind in a power failure."""
+def _files(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
+    """The files and those in the folders, also what `write` leaves in a power failure; why a folder cannot be read.
+
+    Links are followed, since a link does not hold the recordings.
+    """
     for path in paths:
         if not path.exists():
             raise GesturedError(f"{path}: is not there; nothing was removed")
-    inside = [[*path.rglob("*.npz"), *path.rglob(".*.npz.*")] if path.is_dir() else [path] for path in paths]
-    # Links are resolved, since a link does not hold the recordings.
-    return list(dict.fromkeys(file.resolve() for some in inside for file in sorted(some)))
+    found = {path.resolve(): None for path in paths if not path.is_dir()}
+    unread: list[OSError] = []
+    seen = set()  # folders; a link may lead back to one
+    walks = [os.walk(path, onerror=unread.append, followlinks=True) for path in paths if path.is_dir()]
+    for folder, folders, names in chain.from_iterable(walks):
+        seen.add(os.path.realpath(folder))
+        folders[:] = [inner for inner in sorted(folders) if os.path.realpath(Path(folder, inner)) not in seen]
+        inside = [name for name in sorted(names) if name.endswith(".npz") or (name[0] == "." and ".npz." in name)]
+        found |= dict.fromkeys(Path(folder, name).resolve() for name in inside)
+    return list(found), [f"{error.filename}: {error.strerror}" for error in unread]
 
 
 def _whole(file: Path) -> None:

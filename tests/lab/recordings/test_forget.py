@@ -2,9 +2,11 @@
 
 import errno
 import json
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,6 +67,36 @@ def test_links_and_what_a_power_cut_left_behind_are_looked_into(
     assert (links / "linked.npz").is_symlink()
     assert read(kept / "07.npz").subjects.tolist() == ["08"]
     assert not (links / ".x.npz.4711").exists()
+
+
+def test_folders_that_are_linked_or_cannot_be_read_are_not_passed_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk, path, scan = tmp_path / "disk", tmp_path / "recordings", os.scandir
+    (path / "locked").mkdir(parents=True)
+    disk.mkdir()
+    write(disk / "07.npz", of("07", "07"))
+    (path / "linked").symlink_to(disk)
+    (disk / "back").symlink_to(path)
+
+    def refused(folder: Any) -> Any:
+        if Path(folder).name == "locked":
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+        return scan(folder)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    status, out, _ = run(capsys, "07", path, "--yes")
+    assert (status, out.count(f"{disk / '07.npz'}: 2 of 2 recordings\n")) == (1, 1)
+    assert f"not looked into: {path / 'locked'}: Permission denied\n" in out
+    assert not (disk / "07.npz").exists()
+
+
+def test_a_person_whom_the_recordings_call_by_a_name_is_forgotten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "named.npz", of("Ada Löwe", "08"))
+    assert run(capsys, "Ada Löwe", tmp_path, "--yes")[0] == 0
+    assert read(tmp_path / "named.npz").subjects.tolist() == ["08"]
 
 
 def test_numbers_as_subjects_are_found_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
