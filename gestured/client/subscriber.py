@@ -81,14 +81,15 @@ class Subscriber:
         return self
 
     def __next__(self) -> dict[str, Any]:
-        for _, event in self.lines():
-            if event.get("type") != "hello":
-                return event
+        end = self._end()  # also across hellos, since a daemon that starts again and again says no event
+        while (line := self._next_line(end)) is not None:
+            if line[1].get("type") != "hello":
+                return line[1]
         raise StopIteration
 
     def lines(self) -> Iterator[tuple[str, dict[str, Any]]]:
         """Each line as it came, and parsed; also the `hello` of each connection."""
-        while (line := self._next_line()) is not None:
+        while (line := self._next_line(self._end())) is not None:
             yield line
 
     @property
@@ -122,9 +123,12 @@ class Subscriber:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _next_line(self) -> tuple[str, dict[str, Any]] | None:
-        """The next line; None once the subscriber is closed."""
-        end = math.inf if self._timeout is None else time.monotonic() + self._timeout
+    def _end(self) -> float:
+        """Until when to wait from now on, in monotonic s."""
+        return math.inf if self._timeout is None else time.monotonic() + self._timeout
+
+    def _next_line(self, end: float) -> tuple[str, dict[str, Any]] | None:
+        """The next line; None once the subscriber is closed. Raises TimeoutError if none has come by `end`."""
         try:
             with self._iterating:
                 while not self._closed:

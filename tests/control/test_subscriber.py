@@ -101,6 +101,26 @@ def test_a_pause_is_told_and_loses_nothing(fake: FakeDaemon):
         assert events == [GESTURE]
 
 
+def test_a_daemon_that_only_greets_holds_up_no_timeout(fake: FakeDaemon):
+    """Else only the last of thirty starts, a tenth of a second apart, would be followed by the TimeoutError."""
+    greeted, stop = 0, threading.Event()
+    fake.listener.settimeout(0.05)
+
+    def start_again() -> None:
+        nonlocal greeted
+        while not stop.is_set() and greeted < 30:
+            with suppress(OSError):
+                fake.accept()
+                greeted += 1
+                fake.close()
+
+    with Subscriber(fake.path, timeout=0.25) as subscriber, meanwhile(start_again):
+        with pytest.raises(TimeoutError):
+            next(subscriber)
+        stop.set()
+    assert greeted < 30
+
+
 def test_a_line_without_end_is_refused_before_it_fills_the_memory(fake: FakeDaemon):
     def serve() -> None:
         fake.accept()
