@@ -27,7 +27,7 @@ class Seen:
     count: int = 0
     first: float = 0.0  # s
     last: float = 0.0
-    sources: set[str] = field(default_factory=set)
+    sources: Counter[str] = field(default_factory=Counter)  # messages by sender, of the first four
     frames: list[tuple[float, NDArray[np.generic] | bytes]] = field(default_factory=list)  # (s, what may be a frame)
     integer: int | None = None  # the first integer of the last message
     steps: int = 0  # how often that integer grew by one from message to message
@@ -36,6 +36,12 @@ class Seen:
     def rate_hz(self) -> float:
         """Messages a second; 0 for a single message."""
         return (self.count - 1) / (self.last - self.first) if self.last > self.first else 0.0
+
+    @property
+    def contested(self) -> bool:
+        """Whether the daemon takes one sender alone; one that opens a new port for each message is one (`Owner`)."""
+        hosts = {source.rpartition(":")[0] for source in self.sources}
+        return len(hosts) > 1 or len(self.sources) > 1 < max(self.sources.values())
 
     @property
     def counted(self) -> bool:
@@ -100,8 +106,8 @@ class Sight:
             seen = self.seen.setdefault(key, Seen(*key, first=t))
             seen.count += 1
             seen.last = t
-            if len(seen.sources) < 4:
-                seen.sources.add(source)
+            if source in seen.sources or len(seen.sources) < 4:
+                seen.sources[source] += 1
             if key[1] and message.args and isinstance(message.args[-1], np.ndarray | bytes):
                 self._keep(seen, t, message.args[-1])
 

@@ -112,7 +112,7 @@ def _remarks(seen: Seen) -> Iterator[str]:
         yield f"  {address}: {NOT_TAKEN[found[1]]} are not taken: send f"
     if not seen.taxels():
         return
-    if len(seen.sources) > 1:
+    if seen.contested:
         several = "has several senders: the daemon takes the first; give each sensor a name of its own"
         yield f"  {address} {several}"
     if split_address(seen.address) is None and not seen.address.endswith(TRAJECTORY):

@@ -126,7 +126,9 @@ def test_another_pattern_is_mentioned() -> None:
 def test_sniff_says_what_may_be_wrong(run) -> None:
     status, out, _ = run("sniff", "--listen", free_address(), "--seconds", "0.1")
     assert status == 1 and "nothing arrives" in out
-    two = Sight()
-    for n, source in enumerate(("a:1", "a:2", "a:2")):
-        two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
-    assert "has several senders" in "\n".join(lines(two, []))
+    new_ports = ("a:1", "a:2", "a:3", "a:4", "a:5")  # one sender, such as oscsend
+    for sources, several in (("a:1", "a:2", "a:2"), True), (("a:1", "b:1"), True), (new_ports, False):
+        sight = Sight()
+        for n, source in enumerate(sources):
+            sight.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
+        assert ("has several senders" in "\n".join(lines(sight, []))) == several
