@@ -15,7 +15,7 @@ from gestured.core.errors import RecordingError
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
-from gestured.record.check import SESSION
+from gestured.record.check import SESSION, UNNAMED
 from gestured.record.judge import NONE, Outcome, Performed, tallied
 from gestured.record.tape import Packet, Tape
 
@@ -58,7 +58,8 @@ class Labelled:
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Compare the events of a replay with the labels."""
         performed = list(self.performed())
-        asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
+        named = [one for one in performed if one.label != UNNAMED]
+        asked = {id(one) for one in named if knew(self._sensor, one.onset)}
         _, outcomes = tallied(performed, (line for line in lines if line["type"] in ("gesture", "unknown")))
         found = [
             outcome
@@ -66,7 +67,7 @@ class Labelled:
             if outcome.verdict in DIFFERENT and (outcome.performed is None or id(outcome.performed) in asked)
         ]
         found.sort(key=lambda one: one.performed.onset if one.performed else float((one.event or {})["onset"]))
-        skipped = len(performed) - len(asked)
+        skipped = len(named) - len(asked)
         return f"{len(asked)} labels", skipped, [self._difference(outcome) for outcome in found]
 
     def _packets(self) -> Iterator[Packet]:

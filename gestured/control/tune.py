@@ -119,7 +119,7 @@ def _words(tuned: Tuned) -> Iterator[str]:
     total, hours = max(played.meant, 1e-9), max(played.hours, 1e-9)
     yield f"{len(played.performed)} gestures, {played.others} non-gestures, {60 * hours:.1f} minutes; {name}"
     if played.skipped:
-        yield f"left out, since the sensor was not known yet: {played.skipped}"
+        yield f"left out, since the gesture or the sensor was not known: {played.skipped}"
     if tuned.missed_by == "model":
         yield "nobody performed a gesture: what is missed is taken from the model's own curve"
     yield f"threshold  missed   wrong  false/h   {'░ missed':<10}{'█ wrong and false'}"

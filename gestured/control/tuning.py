@@ -14,6 +14,7 @@ import numpy as np
 from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL, Curve
 from gestured.model.model import Model
+from gestured.record.check import UNNAMED
 from gestured.record.judge import NONE, Performed, Said, owners, verdicts
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
@@ -31,7 +32,7 @@ class Played:
     performed: list[Performed] = field(default_factory=list)  # gestures alone
     others: int = 0  # number of non-gestures performed
     said: list[Said] = field(default_factory=list)
-    skipped: int = 0  # number of performances that began before the sensor was known
+    skipped: int = 0  # number of performances that nobody has named, or that began before the sensor was known
     seconds: float = 0.0
 
     @property
@@ -52,10 +53,11 @@ class Played:
     ) -> None:
         """Add the performances of one recording, and its gesture events at threshold 0, in order.
 
-        A performance that began before the sensor was known (`knew` at a time in s) is left out with its events.
+        A performance that nobody has named, or that began before the sensor was known (`knew` at a time in s), is left
+        out with its events.
         """
         spans = [(float(event["onset"]), float(event["offset"])) for event in events]
-        used = [one for one in performed if knew(one.onset)]
+        used = [one for one in performed if one.label != UNNAMED and knew(one.onset)]
         left_out = {id(one) for one in performed} - {id(one) for one in used}
         self.skipped += len(left_out)
         self.performed += [one for one in used if one.label != NONE]

@@ -104,6 +104,12 @@ def test_what_is_touched_before_the_sensor_can_be_known_is_not_compared(replay, 
     assert (status, out) == (0, "") and "0 labels, 2 before the sensor was known, 0 differences" in err
 
 
+def test_what_nobody_has_named_is_not_compared(replay, tmp_path: Path) -> None:
+    path = labelled(tmp_path / "o.npz", *(("other", Hand().swipe("left")),) * 2)
+    status, out, err = replay(path, "--model", tiny_model.make(tmp_path / "tiny.onnx"), "--diff")
+    assert (status, out) == (0, "") and "0 labels, 0 differences" in err
+
+
 def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, tmp_path: Path) -> None:
     hand = Hand()
     parts = [hand.idle(2.0) + hand.swipe("left") + hand.idle(1.5), hand.idle(1.0) + hand.swipe("up") + hand.idle(1.0)]
