@@ -18,6 +18,8 @@ from gestured.record.recordings import Recordings, touch_arrays
 from gestured.record.replay import frames_used, opened
 from gestured.record.tape import Tape
 
+ROUNDED_S = 1e-3  # more than the times of frames and events, which are made of different sums, differ by rounding
+
 
 def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
@@ -78,14 +80,15 @@ def _seen(frame: Frame, mounting: Mounting) -> Frame:
 def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:
     frames = [frame for each in sessions.values() for frame in each]
     touches, ids = touch_arrays(frames)
-    spans = {name: (each[0].t, each[-1].t) for name, each in sessions.items()}
-    events = [
-        (list(sessions).index(e["sensor"]), e["gesture"], e["onset"], e["offset"])
-        for e in found.events
-        if e["type"] == "gesture"
-        and e["sensor"] in spans
-        and spans[e["sensor"]][0] <= e["onset"] <= e["offset"] <= spans[e["sensor"]][1]
-    ]
+    events = []
+    for g, (name, each) in enumerate(sessions.items()):
+        first, last = each[0].t, each[-1].t
+        events += [
+            (g, e["gesture"], max(e["onset"], first), min(e["offset"], last))
+            for e in found.events
+            if (e["type"], e.get("sensor")) == ("gesture", name)
+            and first - ROUNDED_S <= e["onset"] <= e["offset"] <= last + ROUNDED_S
+        ]
     labels = np.array([label for _, label, _, _ in events], dtype="U64")
     return Recordings(
         frames=np.stack([frame.values for frame in frames]),

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import socket
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from tests.control.conftest import gestures
 from tests.control.test_foreign_text import HOSTILE, plain
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
+from tests.sockets import GESTURE
 
 
 def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded, run, daemon, tmp_path) -> None:
@@ -248,28 +250,44 @@ def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path:
     assert path.read_bytes() == before
 
 
+def three_frames(path: Path, frame: Frame, *events: Mapping[str, object], **mounted: object) -> Path:
+    """A tape of a sensor of 3 x 5 taxels that sends a frame three times, from 10**9 s on."""
+    settings = {"model": "cnn_lstm", "fallback": [], "grid": [3, 5], "sensors": {"arm": mounted}}
+    told = {"settings": settings, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
+    with tape_writer.Writer(path, told, 1 << 20) as writer:
+        for n in range(3):
+            writer.packet(10**18 + n * 10**8, "127.0.0.1:5", Form("arm", "ints").packet(frame, n, 0.0))
+        for event in events:
+            writer.event(10**18, event)
+    return path
+
+
 @pytest.mark.parametrize(
     "mounted", [{}, {"rotate": 90}, {"rotate": 180, "invert": True}, {"rotate": 270, "mirror": True}]
 )
 def test_an_export_is_what_a_person_in_front_of_the_sensor_sees(
     run, tmp_path: Path, mounted: dict[str, object]
 ) -> None:
-    settings = {"model": "cnn_lstm", "fallback": [], "grid": [3, 5], "sensors": {"arm": mounted}}
-    told = {"settings": settings, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
-    mounting = Mounting(**mounted)
-    sent = np.arange(15).reshape(3, 5)
-    strongest = 0.0 if mounting.invert else 4.0, 2.0 if mounting.invert else 0.0  # x to the right and y upward, as sent
-    with tape_writer.Writer(tmp_path / "tape.mcap", told, 1 << 20) as writer:
-        for n in range(3):
-            frame = Frame(0.0, sent, (Touch(7, *strongest),))
-            writer.packet(10**18 + n * 10**8, "127.0.0.1:5", Form("arm", "ints").packet(frame, n, 0.0))
-    status, _, err = run("export", tmp_path / "tape.mcap", tmp_path / "out.npz")
+    mounting, sent = Mounting(**mounted), np.arange(15).reshape(3, 5)
+    strongest = (0.0, 2.0) if mounting.invert else (4.0, 0.0)  # x to the right and y upward, as sent
+    path = three_frames(tmp_path / "tape.mcap", Frame(0.0, sent, (Touch(7, *strongest),)), **mounted)
+    status, _, err = run("export", path, tmp_path / "out.npz")
     assert (status, err) == (0, "")
     found = recording.read(tmp_path / "out.npz")
     assert (found.frames == mounting.frame(sent)).all() and len(found.frames) == 3
     (finger,) = next(found.stream(0)).touches
     rows, columns = mounting.shape(3, 5)
     assert divmod(int(found.frames[0].argmax()), columns) == (rows - 1 - finger.y, finger.x)
+
+
+@pytest.mark.parametrize("towards", [-np.inf, np.inf])
+def test_a_gesture_that_ends_with_the_last_frame_is_exported(run, tmp_path: Path, towards: float) -> None:
+    """A sensor that sends only while it is touched; the times of frames and events are rounded differently."""
+    offset = float(np.nextafter(10**9 + 0.2, towards))
+    event = GESTURE | {"sensor": "arm", "onset": 10**9 + 0.1, "offset": offset}
+    path = three_frames(tmp_path / "tape.mcap", Frame(0.0, np.arange(15).reshape(3, 5)), event)
+    assert run("export", path, tmp_path / "out.npz")[0] == 0
+    assert recording.read(tmp_path / "out.npz").event_labels.tolist() == ["swipe_left"]
 
 
 def test_a_tape_of_gestures_that_the_model_lacks_is_one_sentence(run, tmp_path: Path) -> None:
