@@ -1,6 +1,7 @@
 """The comparison of a recording's events with those of its replay."""
 
 from bisect import bisect_left, bisect_right
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from operator import attrgetter
 from pathlib import Path
@@ -11,7 +12,8 @@ from gestured.control.show import clock
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets are at most so far apart are about the same contact
-OPEN = "open"  # stands for the answer to a contact before whose answer the recording ends
+# Stand for answers that are not compared: the recording ends before one, and the replay did not know the sensor yet.
+OPEN, EARLY = "none so far", "before the sensor was known"
 CONFIDENCE_TOLERANCE = 0.05  # a baseline that was learned at another moment may change a confidence by so much
 
 Line = Mapping[str, Any]  # of the event stream, with the recording's times
@@ -63,12 +65,15 @@ class Recorded:
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Compare the events of a replay with the recorded ones."""
-        before = answers(self.tape.events)
         # A daemon that knew the sensor before the recording began has answered contacts that a replay cannot answer.
-        usable = [answer for answer in before if knew(answer.sensor, answer.onset)]
+        before = [
+            answer if knew(answer.sensor, answer.onset) else answer._replace(answer=EARLY)
+            for answer in answers(self.tape.events)
+        ]
         after = [answer for answer in answers(lines) if knew(answer.sensor, answer.onset)]
-        count = sum(answer.answer != OPEN for answer in usable)
-        return f"{count} recorded answers", len(before) - len(usable), differences(usable, after)
+        counts = Counter(answer.answer for answer in before)
+        compared = len(before) - counts[EARLY] - counts[OPEN]
+        return f"{compared} recorded answers", counts[EARLY], differences(before, after)
 
 
 def answers(lines: Iterable[Line]) -> list[Answer]:
@@ -100,7 +105,7 @@ def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Diffe
         new = min(near, key=lambda answer: abs(answer.onset - old.onset), default=None)
         if new is not None:
             rest.remove(new)
-        if old.answer != OPEN and (new is None or not _alike(old, new)):
+        if old.answer not in (OPEN, EARLY) and (new is None or not _alike(old, new)):
             found.append(Difference(old, new))
     return [*found, *(Difference(None, new) for new in rest)]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gestured.client.sensor import Form
-from gestured.control.diff import Answer, Difference, differences
+from gestured.control.diff import Answer, Difference, Recorded, differences
 from gestured.control.record import Keeper
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Touch
@@ -288,6 +288,14 @@ def test_a_gesture_that_ends_with_the_last_frame_is_exported(run, tmp_path: Path
     path = three_frames(tmp_path / "tape.mcap", Frame(0.0, np.arange(15).reshape(3, 5)), event)
     assert run("export", path, tmp_path / "out.npz")[0] == 0
     assert recording.read(tmp_path / "out.npz").event_labels.tolist() == ["swipe_left"]
+
+
+def test_a_contact_that_began_just_before_the_sensor_was_known_is_no_difference(tmp_path: Path) -> None:
+    """The replay sees its rest, which it answers otherwise."""
+    said = [GESTURE | {"onset": onset, "offset": 14.0, "decided": 14.5} for onset in (9.0, 10.0, 12.0)]
+    path = three_frames(tmp_path / "tape.mcap", Frame(0.0, np.zeros((3, 5))), *said)
+    again = [GESTURE | {"type": "unknown", "onset": 10.1}, said[2]]
+    assert Recorded(path).compare(again, lambda sensor, t: t >= 10.05) == ("1 recorded answers", 2, [])
 
 
 def test_a_tape_of_gestures_that_the_model_lacks_is_one_sentence(run, tmp_path: Path) -> None:
