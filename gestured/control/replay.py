@@ -102,14 +102,14 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
         replay = Replay(source.tape, scene, ladder, provisional=args.provisional)
     except RecordingError as error:
         raise RecordingError(f"{args.file}: {error}") from error
+    events = (event for event in replay.events() if not isinstance(event, Status))
     if args.diff:
         another = isinstance(source, Recorded) and ladder.model.sha256 != source.maker.sha256
-        events = [event for event in replay.events() if not isinstance(event, Status)]
-        lines = [json.loads(messages.to_json(event, replay.epoch_of(event.sensor))) for event in events]
+        lines = [json.loads(messages.to_json(event, replay.epoch_of(event.sensor))) for event in tuple(events)]
         return _compare(args, source, lines, replay.knew, another=another)
     early: dict[str, dict[str, Any]] = {}  # for `readable`
-    for event in replay.events():
-        line = json.loads(messages.to_json(event, replay.epoch))
+    for event in events:
+        line = json.loads(messages.to_json(event, replay.epoch_of(event.sensor)))
         tell(args.json, line, readable(line, early))
     return 0
 

@@ -23,6 +23,8 @@ from gestured.core.scene import Scene
 from gestured.record.tape import Tape
 from gestured.record.tape_reader import read
 
+ONSETS = 64  # contacts from which the offset of a sensor's own clock is learned
+
 
 @dataclass(frozen=True)
 class Maker:
@@ -132,7 +134,8 @@ class Replay:
         for t_ns, event in zip(tape.told_ns, tape.events, strict=False):
             if event["type"] == "onset":
                 self._told.setdefault((event["sensor"], t_ns), []).append(event["onset"])
-        self._ahead: dict[str, list[float]] = {}  # by sensor: s by which onsets were later in the daemon
+        # By sensor: s by which the latest onsets were later in the daemon.
+        self._ahead: dict[str, deque[float]] = {}
 
     def events(self) -> Iterator[Event]:
         """All events of the tape, at whose end every sensor falls silent."""
@@ -163,7 +166,7 @@ class Replay:
             here = [one.onset + self.epoch for one in opened if one.sensor == sensor]
             there = self._told.get((sensor, t_ns), [])
             if len(here) == len(there):
-                self._ahead.setdefault(sensor, []).extend(map(sub, there, here))
+                self._ahead.setdefault(sensor, deque(maxlen=ONSETS)).extend(map(sub, there, here))
 
     def epoch_of(self, sensor: str) -> float:
         """The s to add to a sensor's times to get the daemon's, in s since 1970, as far as the tape was played.
@@ -172,7 +175,7 @@ class Replay:
         learned from contacts that the same packets have opened here and in the daemon.
         """
         own_clock = self._hub.scene.clock_of(sensor) == "sensor"
-        return self.epoch + (median(self._ahead.get(sensor, [0.0])) if own_clock else 0.0)
+        return self.epoch + (median(self._ahead.get(sensor) or [0.0]) if own_clock else 0.0)
 
     def knew(self, sensor: str, t: float) -> bool:
         """Whether a sensor's idle state was known at `t`, in the daemon's time, as far as the tape was played."""

@@ -72,6 +72,8 @@ def test_a_tape_that_begins_while_the_sensors_clock_is_ahead_is_one_like_any_oth
     model = tape_reader.read(path).scene["settings"]["model"]
     status, out, err = run("replay", path, "--diff", "--model", model)
     assert (status, out) == (0, "") and "2 recorded answers" in err
+    twins = [json.loads(line) for line in run("replay", path, "--json", "--model", model)[1].splitlines()]
+    assert [e["onset"] for e in twins if "gesture" in e] == pytest.approx([e["onset"] for e in told], abs=0.001)
     assert run("export", path, tmp_path / "ahead.npz")[0] == 0
     found = recording.read(tmp_path / "ahead.npz")
     assert found.event_labels.tolist() == ["swipe_left", "swipe_up"] == [event["gesture"] for event in told]
