@@ -216,6 +216,14 @@ def test_a_broken_value_costs_its_frame_alone(recognizer: Any, value: float, kin
     assert [type(event) for event in events] == [Onset]
 
 
+@pytest.mark.parametrize("gate", [5, "", "back door", None], ids=repr)
+def test_a_gate_has_a_name_and_another_word_closes_nothing(recognizer: Any, gate: Any):
+    with pytest.raises(ValueError, match="gate: expected 1 to 64"):
+        recognizer.inhibit(0.0, gate)
+    recognizer.inhibit(0.0, "door")
+    assert recognizer.allow(0.0, "door")[-1].closed == ()
+
+
 def test_reset_ends_the_contact_that_is_open(recognizer: Any):
     touched(recognizer)
     assert [getattr(event, "reason", "") for event in recognizer.reset()] == ["restart", ""]

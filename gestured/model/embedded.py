@@ -112,12 +112,14 @@ class Embedded:
     def inhibit(self, t: float, gate: str) -> list[Event]:
         """Close a gate at `t` s: until it is opened every contact is unknown, and one that began before as well.
 
-        Raises ValueError for a time before the last frame's.
+        Raises ValueError for a time before the last frame's, or a name that no gate has.
         """
+        if not isinstance(gate, str) or not is_sensor(gate):
+            raise ValueError(f"gate: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {gate!r}")
         return self._gate(t, {*self._closed, gate})
 
     def allow(self, t: float, gate: str) -> list[Event]:
-        """Open a gate at `t` s; while others are closed the sensor stays silent. Raises ValueError as `inhibit`."""
+        """Open a gate at `t` s; while another one is closed the sensor stays silent. ValueError for an earlier time."""
         return self._gate(t, self._closed - {gate})
 
     def reset(self) -> list[Event]:
