@@ -34,7 +34,7 @@ page() {  # page FILE: a document, whose neighbours all stand in one folder
 }
 
 keep() {  # keep FILE PATH: an operator's file stays as it is, here and by `make uninstall`
-    [ -e "$root$2" ] || { mkdir -p "$root$(dirname "$2")"; cp "$1" "$root$2"; }
+    [ -e "$root$2" ] || install -D -m 644 "$1" "$root$2"
 }
 
 pip() {  # pip ARGUMENT...: install with the pip of VENV

@@ -32,32 +32,41 @@ def test_a_target_asks_pip_for_what_is_missing_and_for_nothing_else(tmp_path: Pa
 
 
 def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_stay(tmp_path: Path):
-    """With a pip that installs nothing."""
+    """With a pip that installs nothing, below another prefix, from a clone that its owner alone may read."""
     pytest.importorskip("shtab")
-    root, programs = tmp_path / "root", tmp_path / "venv" / "bin"
+    root, clone, programs = tmp_path / "root", tmp_path / "clone", tmp_path / "venv" / "bin"
     programs.mkdir(parents=True)
     for name, text in (("python", f'exec {sys.executable} "$@"\n'), ("pip", "")):
         (programs / name).write_text(f"#!/bin/sh\n{text}")
         (programs / name).chmod(0o755)
+    clone.mkdir()
+    for path in ROOT.iterdir():
+        if path.name in ("deploy", "systemd"):
+            shutil.copytree(path, clone / path.name)
+        else:
+            (clone / path.name).symlink_to(path)
+    for name in ("deploy/gestured.toml", "systemd/gestured.default"):
+        (clone / name).chmod(0o600)
 
     def run(script: str, *arguments: Path) -> None:
-        command = [ROOT / "deploy" / f"{script}.sh", *arguments, root, "/usr"]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+        command = [f"deploy/{script}.sh", *arguments, root, "/usr/local"]
+        done = subprocess.run(command, cwd=clone, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stderr
 
-    old, mine = root / "usr/share/doc/gestured/old.md", root / "etc/gestured/gestured.toml"
+    share, lib, etc = (root / name for name in ("usr/local/share/doc/gestured", "usr/local/lib/gestured", "etc"))
+    old, mine, fresh = share / "old.md", etc / "default/gestured", etc / "gestured/gestured.toml"
     before = {
         old: "a page that is no more",
-        mine: "touch = true\n",
-        root / "usr/lib/gestured/installed": "/usr/share/doc/gestured/old.md\n",
-        root / "usr/lib/gestured/old.py": "a module that is no more",
+        mine: "GESTURED_TOUCH=true\n",
+        lib / "installed": "/usr/local/share/doc/gestured/old.md\n",
+        lib / "old.py": "a module that is no more",
     }
     for path, text in before.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     run("install", programs.parent)
-    assert not old.exists() and not (root / "usr/lib/gestured/old.py").exists()
-    assert (root / "usr/share/doc/gestured/README.md").exists()
+    assert not old.exists() and not (lib / "old.py").exists()
+    assert fresh.stat().st_mode & 0o777 == 0o644  # the daemon's account reads it
     run("uninstall")
-    assert [path for path in root.rglob("*") if path.is_file()] == [root / "etc/default/gestured", mine]
+    assert sorted(path for path in root.rglob("*") if path.is_file()) == [mine, fresh]
     assert mine.read_text() == before[mine]
