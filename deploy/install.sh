@@ -22,7 +22,7 @@ trap 'rm -rf "$work" "$new"' EXIT
 
 put() {  # put MODE FILE PATH: programs and pages are where PREFIX says
     mkdir -p "$root$(dirname "$3")"
-    sed "s|/usr/bin/gesture|$prefix/bin/gesture|g; s|/usr/share/doc|$prefix/share/doc|g" "$2" >"$root$3.new"
+    sed "s,/usr/\(bin/gesture\|include\|lib/gestured\|share/doc\),$prefix/\1,g" "$2" >"$root$3.new"
     chmod "$1" "$root$3.new"
     mv "$root$3.new" "$root$3"
     echo "$3" >>"$work/installed"

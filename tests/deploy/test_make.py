@@ -1,5 +1,6 @@
 """What make does in a clone whose environment is there already; pip and other programs are stand-ins."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -67,6 +68,9 @@ def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_s
     run("install", programs.parent)
     assert not old.exists() and not (lib / "old.py").exists()
     assert fresh.stat().st_mode & 0o777 == 0o644  # the daemon's account reads it
+    operating = (share / "operating.md").read_text()
+    assert re.findall(r"/usr/(?:bin/gesture|lib/gestured|share/doc)\S*", operating) == []
+    assert "/usr/local/lib/gestured/gestured_models/lstm.onnx" in operating
     run("uninstall")
     assert sorted(path for path in root.rglob("*") if path.is_file()) == [mine, fresh]
     assert mine.read_text() == before[mine]
