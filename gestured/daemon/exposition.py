@@ -67,8 +67,7 @@ class _Collector:
         for metric in vars(self._metrics).values():
             if isinstance(metric, Counter):
                 counter = CounterMetricFamily(metric.name, metric.text, labels=metric.labels)
-                values = dict(metric.values)
-                for labels, value in (values or ({(): 0} if not metric.labels else {})).items():
+                for labels, value in (dict.fromkeys(metric.zeros, 0) | metric.values).items():
                     counter.add_metric(labels, value)
                 yield counter
             elif isinstance(metric, Histogram):

@@ -28,9 +28,16 @@ CONFIDENCE_BUCKETS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 class Counter:
     """A total for each of the first `most` combinations of labels; all later ones are counted as "other"."""
 
-    def __init__(self, name: str, text: str, *labels: str, most: int = 64, dated: bool = False) -> None:
-        """`dated`: the counter also remembers when each combination was last counted."""
+    def __init__(
+        self, name: str, text: str, *labels: str, most: int = 64, dated: bool = False, zeros: tuple[str, ...] = ()
+    ) -> None:
+        """`dated`: the counter also remembers when each combination was last counted.
+
+        `zeros` are values of the one label that are exposed as 0 before they are counted, since Prometheus sees no
+        increase from a series that is not there to its first value.
+        """
         self.name, self.text, self.labels, self._most, self._dated = name, text, labels, most, dated
+        self.zeros = [(value,) for value in zeros] if labels else [()]
         self.values: dict[tuple[str, ...], int] = {}
         self.last: dict[tuple[str, ...], float] = {}  # monotonic s
 
@@ -88,14 +95,16 @@ class Metrics:
             "gate",
             most=NAMED_GATES,
         )
-        self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
+        self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason", zeros=("model",))
         self.provisional = Counter("gestured_provisional", "Provisional events by what became of them", "result")
         self.lead = Histogram(
             "gestured_provisional_lead_seconds", "From a provisional event that was confirmed to its answer", LEAD_S
         )
         self.internal_errors = Counter("gestured_internal_errors", "Bugs that were caught", dated=True)
         self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
-        self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result", dated=True)
+        self.reloads = Counter(
+            "gestured_reloads", "Reloads of model and configuration", "result", dated=True, zeros=("refused",)
+        )
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result", dated=True)
         self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get", dated=True)
         self.evicted = Counter("gestured_clients_evicted", "Clients cut off or turned away", "reason", dated=True)

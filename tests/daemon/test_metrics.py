@@ -96,6 +96,14 @@ def test_there_are_at_most_200_series_whatever_arrives(usual: dict[str, Any]) ->
     assert 'gestured_frames_total{result="ok",sensor="other"} 492.0' in series
 
 
+def test_what_an_alert_counts_is_0_before_it_happens_first(usual: dict[str, Any]) -> None:
+    """Prometheus sees no increase from a series that was not there to its first value."""
+    rules = (ROOT / "deploy" / "prometheus" / "gestured.rules.yml").read_text()
+    counted = re.findall(r"increase\((\w+(?:\{[^}]*\})?)\[\w+\]\) > ", rules)
+    assert 'gestured_reloads_total{result="refused"}' in counted
+    assert {f"{series} 0.0" for series in counted} <= set(exposition(Metrics(), usual).decode().splitlines())
+
+
 def test_every_reason_to_drop_has_its_place_in_that_count() -> None:
     """A new reason would make another series: the test above must know it."""
     code = "".join(path.read_text() for path in (ROOT / "gestured").rglob("*.py"))
