@@ -5,6 +5,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -119,3 +120,12 @@ def test_each_socket_belongs_to_the_service_that_lists_it():
     for socket in sockets:
         assert keys(socket)["Service"] == ["gestured.service"]
         assert f"gestured-{keys(socket)['FileDescriptorName'][0]}.socket" == socket
+
+
+@pytest.mark.parametrize("section", ["Stop it", "Remove"])
+def test_what_stops_the_daemon_stops_each_socket_that_would_start_it_again(section: str):
+    """Also gestured-gates.socket, which may be enabled."""
+    page = (UNITS.parent / "docs" / "operating.md").read_text()
+    command = re.search(rf"^## {section}\n.*?^(sudo systemctl [^\n]*)", page, re.DOTALL | re.MULTILINE)
+    sockets = [path.name for path in UNITS.glob("*.socket")]
+    assert [name for name in sockets if not any(fnmatch(name, unit) for unit in shlex.split(command[1]))] == []
