@@ -102,13 +102,23 @@ def test_an_instance_differs_from_the_standalone_service_in_its_name_alone():
     one, many = keys("gestured-standalone.service"), keys("gestured@.service")
     different = {key for key in one | many if one.get(key) != many.get(key)}
     assert different == {
-        "Description", "Conflicts", "ExecStart", "ExecStartPre", "ExecReload", "Environment", "ReadWritePaths",
-        "StateDirectory",
+        "Description", "Conflicts", "ExecStart", "ExecStartPre", "Environment", "ReadWritePaths", "StateDirectory",
     }  # fmt: skip
     for key in different - {"Description", "Conflicts"}:
-        assert [value.replace("-%i", "").replace("%i", "gestured") for value in many[key]] == [
-            value if key != "ExecReload" else f"{value} --control /run/gestured/events.ctl" for value in one[key]
-        ]
+        assert [value.replace("-%i", "").replace("%i", "gestured") for value in many[key]] == one[key]
+
+
+@pytest.mark.parametrize("unit", ["gestured.service", "gestured-standalone.service", "gestured@.service"])
+def test_a_reload_asks_the_daemon_whose_sockets_the_configuration_names(tmp_path: Path, unit: str):
+    """There is none, so the command says where it looked."""
+    found = keys(unit)
+    (tmp_path / "left.toml").write_text(f'socket = "{tmp_path}/other.sock"\n')
+    (tmp_path / "gestured.toml").symlink_to("left.toml")
+    given = " ".join(found["Environment"]).replace("%i", "left").replace("/etc/gestured", str(tmp_path)).split()
+    reload = found["ExecReload"][0].replace("/usr/bin/gesturectl", f"{sys.executable} -m gestured.control").split()
+    environment = {"PYTHONPATH": str(UNITS.parent)} | dict(pair.split("=", 1) for pair in given)
+    done = subprocess.run(reload, env=environment, capture_output=True, text=True, timeout=60)
+    assert f"no daemon on {tmp_path}/other.ctl" in done.stderr
 
 
 def test_each_socket_belongs_to_the_service_that_lists_it():
