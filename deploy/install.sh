@@ -19,6 +19,7 @@ if [ -z "$root" ] && dpkg-query --show --showformat='${db:Status-Status}' gestur
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work" "$new"' EXIT
+trap 'exit 130' HUP INT TERM  # dash would leave out the line above
 
 put() {  # put MODE FILE PATH: programs and pages are where PREFIX says
     mkdir -p "$root$(dirname "$3")"
