@@ -101,7 +101,7 @@ def main(arguments: list[str]) -> int | str:
             return "\n".join(faults(number, changelog, changed, git("rev-parse", "HEAD"), tagged)) or 0
         case ["build", out]:
             os.umask(0o022)
-            epoch = int(os.environ.get("SOURCE_DATE_EPOCH") or git("log", "-1", "--format=%ct"))
+            epoch = int(os.environ.get("SOURCE_DATE_EPOCH") or git("log", "-1", "--format=%ct") or 0)
             with tempfile.TemporaryDirectory() as once, tempfile.TemporaryDirectory() as again:
                 files, others = build(Path(once), epoch), build(Path(again), epoch)
                 if differ := [

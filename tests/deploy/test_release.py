@@ -96,6 +96,15 @@ def test_every_pinned_package_has_hashes_and_none_that_is_needed_lacks():
         assert any(pin.startswith(f"{name}==") for pin in pins), name
 
 
+def test_a_folder_that_is_no_clone_is_told_in_a_sentence(tmp_path: Path):
+    """As what is unpacked from an archive."""
+    shutil.copytree(ROOT / "deploy", tmp_path / "deploy")
+    environment = {"PATH": os.environ["PATH"], "GIT_CEILING_DIRECTORIES": str(tmp_path.parent)}
+    command = [sys.executable, "-m", "deploy.release", "build", "dist"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and done.stderr.startswith("packages are built in a clone")
+
+
 def test_make_install_refuses_over_a_debian_package(tmp_path: Path):
     programs = tmp_path / "programs"
     programs.mkdir()
