@@ -16,7 +16,7 @@ amd64) machine=x86_64 ;;
 arm64) machine=aarch64 ;;
 *) echo "there are wheels for amd64 and arm64, not for $arch" >&2; exit 1 ;;
 esac
-. /etc/os-release
+. /etc/os-release  # Debian testing has no VERSION_ID
 python=$("$venv/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 PLATFORM="--python-version $python --implementation cp --abi cp$(echo "$python" | tr -d .) --abi abi3 --abi none"
 for minor in $(seq 17 28); do  # no newer glibc than the package says that it needs
@@ -41,11 +41,11 @@ source=build/deb/source
 deploy/source.sh "$source"
 mv "$source/deploy/debian" "$source/debian"
 head=$(sed -n 's/^## \(.* - .*\)/\1/p' CHANGELOG.md | head -n 1)
-version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' gestured/__init__.py)
+version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' gestured/__init__.py)~$ID${VERSION_ID-$VERSION_CODENAME}
 cat >"$source/debian/changelog" <<END
-gestured ($version~$ID$VERSION_ID) unstable; urgency=medium
+gestured ($version) unstable; urgency=medium
 
-  * Version $version. CHANGELOG.md beside this file says what users notice.
+  * Version ${version%~*}. CHANGELOG.md beside this file says what users notice.
 
  -- The gestured authors <gestured@localhost>  $(date --utc --rfc-email --date "${head#* - }")
 END
@@ -56,5 +56,5 @@ export PLATFORM WHEELS VENV="$venv" MINOR="$python"
     exit 1
 }
 mkdir -p "$out"
-cp "build/deb/gestured_$version~$ID${VERSION_ID}_$arch.deb" "$out"
-echo "$out/gestured_$version~$ID${VERSION_ID}_$arch.deb"
+cp "build/deb/gestured_${version}_$arch.deb" "$out"
+echo "$out/gestured_${version}_$arch.deb"

@@ -105,6 +105,35 @@ def test_a_folder_that_is_no_clone_is_told_in_a_sentence(tmp_path: Path):
     assert done.returncode == 1 and done.stderr.startswith("packages are built in a clone")
 
 
+@pytest.mark.parametrize(
+    ("system", "named"),
+    [("ID=debian\nVERSION_ID=12\n", "debian12"), ("ID=debian\nVERSION_CODENAME=forky\n", "debianforky")],
+)
+def test_a_debian_package_is_named_for_its_system_also_for_debian_testing(tmp_path: Path, system: str, named: str):
+    """Testing has no VERSION_ID. With stand-ins for pip, debhelper and dpkg-buildpackage."""
+    folder, programs = tmp_path / "clone", tmp_path / "venv" / "bin"
+    shutil.copytree(ROOT / "deploy", folder / "deploy")
+    (folder / "gestured").mkdir()
+    for name in ("CHANGELOG.md", "gestured/__init__.py"):
+        shutil.copy(ROOT / name, folder / name)
+    (tmp_path / "os-release").write_text(system)
+    script = folder / "deploy" / "deb.sh"
+    script.write_text(script.read_text().replace("/etc/os-release", str(tmp_path / "os-release")))
+    programs.mkdir(parents=True)
+    package = "echo >../gestured_$(sed -n '1s/.*(\\(.*\\)).*/\\1/p' debian/changelog)_amd64.deb"
+    does = {"python": f'exec {sys.executable} "$@"', "pip": "", "dh": "", "dpkg-buildpackage": package}
+    for name, text in does.items():
+        (programs / name).write_text(f"#!/bin/sh\n{text}\n")
+        (programs / name).chmod(0o755)
+    environment = {"PATH": f"{programs}:{os.environ['PATH']}"}
+    command = 'git init --quiet && git add . && deploy/deb.sh "$1" dist amd64'
+    done = subprocess.run(
+        ["sh", "-c", command, "sh", programs.parent],
+        cwd=folder, env=environment, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout == f"dist/gestured_{gestured.__version__}~{named}_amd64.deb\n", done.stderr
+
+
 def test_make_install_refuses_over_a_debian_package(tmp_path: Path):
     programs = tmp_path / "programs"
     programs.mkdir()
