@@ -105,6 +105,9 @@ def test_bash_completes_commands_flags_choices_and_files():
     for command in programs.commands(programs.PARSERS["gesturectl"]()):
         assert complete("gesturectl", command.prog.split()[-1], "--") == flags(command)
     assert "--model" in complete("gestured", "--mo")
-    assert "README.md" in complete("gestured", "--config", "READ")
-    assert "README.md" in complete("gesturectl", "replay", "READ")
+    for words in (
+        ("gestured", "--config"), ("gesturectl", "replay"), ("gesturectl", "demo", "--model"),
+        ("gesturectl", "export", "tape.mcap"), ("gestured-bridge", "serial"),
+    ):  # fmt: skip
+        assert "README.md" in complete(*words, "READ"), words
     assert complete("gesturectl", "simulate", "--speed", "fa") == {"fast"}
