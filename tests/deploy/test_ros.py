@@ -392,6 +392,8 @@ def test_a_gate_that_cannot_be_closed_is_told(ros: Ros, serve, tmp_path: Path):
         ({"messages": True}, "parameter messages: the package gestured_msgs is not there"),
         ({"frames": ["arm rest"]}, "parameter frames: 'arm rest': expected letters, digits, _ and -"),
         ({"frames": ["armrest"], "to": "9000"}, "parameter to: '9000': expected HOST:PORT"),
+        ({"frames": ["armrest"], "to": "a..b:9000"}, "parameter to: 'a..b:9000': expected HOST:PORT"),
+        ({"frames": ["armrest"], "to": "255.255.255.255:9"}, "cannot send to 255.255.255.255:9: Permission denied"),
         ({"gates": "/nowhere.sock", "gate": "my gate"}, "parameter gate: 'my gate': expected letters"),
     ],
 )

@@ -25,7 +25,8 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, NOTICE_S, Daemon, Line, follow
 from gestured.bridge.gates import OFF, ON, Gate
 from gestured.bridge.ros_names import token
-from gestured.client.sensor import Form, sent_after_refusal
+from gestured.client.address import named
+from gestured.client.sensor import Form, connected, sent_after_refusal
 from gestured.client.subscriber import Subscriber
 from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError, SettingsError
@@ -166,10 +167,8 @@ class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
         """Subscribe to the frames of these sensors, and send them to the daemon."""
         if not sensors:
             return
-        family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-        udp = socket.socket(family, kind)
+        udp = connected(to)
         udp.setblocking(False)
-        udp.connect(address)
         for sensor in sensors:
             topic = f"~/{token(_sensor('frames', sensor))}/frames"
             self.create_subscription(Image, topic, self._forwarder(sensor, udp, to), FRAMES)
@@ -217,7 +216,7 @@ def _sensor(parameter: str, name: str) -> str:
 
 def _address(parameter: str, text: str) -> Address:
     try:
-        return Address.parse(text)
+        return named(text)
     except ValueError as error:
         raise SettingsError(f"parameter {parameter}: {text!r}: expected {error}") from None
 
