@@ -114,6 +114,12 @@ def test_every_query_asks_for_what_the_daemon_says(said: str):
         assert labels <= allowed, f"{where}: {labels - allowed}"
 
 
+def test_the_buckets_that_alerts_are_tested_with_are_the_daemons(said: str):
+    buckets = r'(gestured_\w+_bucket)\{.*\b(le="[^"]+")'
+    tested = set(re.findall(buckets, (RULES.parent / "gestured.rules.test.yml").read_text()))
+    assert tested and tested <= set(re.findall(buckets, said))
+
+
 @promtool
 def test_promtool_finds_nothing_wrong_with_the_metrics(said: str):
     done = subprocess.run(["promtool", "check", "metrics"], input=said, capture_output=True, text=True, timeout=60)
