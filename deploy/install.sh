@@ -50,8 +50,8 @@ if [ -e "$root$lib/installed" ]; then cp "$root$lib/installed" "$work/before"; f
 rm -rf "$new" "$old"
 mkdir -p "$new"  # a folder that may not be made is told now, and not after minutes of pip
 if [ -n "${WHEELS-}" ]; then
-    # shellcheck disable=SC2046,SC2086 # one argument for each wheel; a name of a wheel has no blanks
-    pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM $(echo "$WHEELS"/*.whl)
+    # shellcheck disable=SC2086 # words on purpose
+    pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM "$WHEELS"/*.whl
     pip --no-compile --target "$new" --no-index --no-deps --no-build-isolation .
 else
     pip shtab  # makes the completions

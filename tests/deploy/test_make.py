@@ -1,5 +1,6 @@
 """What make does in a clone whose environment is there already; pip and other programs are stand-ins."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -35,13 +36,14 @@ def test_a_target_asks_pip_for_what_is_missing_and_for_nothing_else(tmp_path: Pa
 def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_stay(tmp_path: Path):
     """With a pip that installs nothing, below another prefix, from a clone that its owner alone may read.
 
-    Somebody ends the first attempt while pip runs, as with Ctrl-C.
+    Somebody ends the first attempt, with wheels as for a Debian package, while pip runs, as with Ctrl-C.
     """
     pytest.importorskip("shtab")
-    root, clone, programs = tmp_path / "root", tmp_path / "clone", tmp_path / "venv" / "bin"
+    root, clone, programs = tmp_path / "root", tmp_path / "my clone", tmp_path / "venv" / "bin"
     programs.mkdir(parents=True)
-    for name, text in (("python", f'exec {sys.executable} "$@"\n'), ("pip", "[ -e again ] || kill -TERM $PPID\n")):
-        (programs / name).write_text(f"#!/bin/sh\n{text}")
+    ended = '[ -z "$WHEELS" ] || { printf "%s\\n" "$@" >asked.txt; kill -TERM $PPID; }'
+    for name, text in (("python", f'exec {sys.executable} "$@"'), ("pip", ended)):
+        (programs / name).write_text(f"#!/bin/sh\n{text}\n")
         (programs / name).chmod(0o755)
     clone.mkdir()
     for path in ROOT.iterdir():
@@ -52,9 +54,10 @@ def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_s
     for name in ("deploy/gestured.toml", "systemd/gestured.default"):
         (clone / name).chmod(0o600)
 
-    def run(script: str, *arguments: Path, status: int = 0) -> None:
+    def run(script: str, *arguments: Path, status: int = 0, wheels: str = "") -> None:
         command = [f"deploy/{script}.sh", *arguments, root, "/usr/local"]
-        done = subprocess.run(command, cwd=clone, capture_output=True, text=True, timeout=120)
+        environment = os.environ | {"WHEELS": wheels, "PLATFORM": "--abi none"}
+        done = subprocess.run(command, cwd=clone, env=environment, capture_output=True, text=True, timeout=120)
         assert done.returncode == status, done.stderr
 
     share, lib, etc = (root / name for name in ("usr/local/share/doc/gestured", "usr/local/lib/gestured", "etc"))
@@ -68,9 +71,12 @@ def test_what_an_older_version_had_installed_goes_with_an_upgrade_and_settings_s
     for path, text in before.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    run("install", programs.parent, status=130)
+    wheels = [clone / "a-1.whl", clone / "b-1.whl"]
+    for wheel in wheels:
+        wheel.touch()
+    run("install", programs.parent, status=130, wheels=str(clone))
+    assert (clone / "asked.txt").read_text().splitlines()[-4:] == ["--abi", "none", *map(str, wheels)]
     assert {path for path in root.rglob("*") if path.is_file()} == set(before) and not lib.with_suffix(".new").exists()
-    (clone / "again").touch()
     run("install", programs.parent)
     assert not old.exists() and not (lib / "old.py").exists()
     assert fresh.stat().st_mode & 0o777 == 0o644  # the daemon's account reads it
