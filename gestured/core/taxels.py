@@ -35,8 +35,8 @@ class Frozen:
         self.mask: Mask = np.zeros(taxels, dtype=bool)
         self.any = False
         self._tells = False  # whether a finger's tremble shows in this sensor's last digit
-        self._still_since = np.full(taxels, math.inf)  # s
-        self._previous: Array = np.zeros(taxels)  # raw counts
+        self._still_since = np.zeros(taxels)  # s
+        self._previous: Array = np.full(taxels, math.nan)  # raw counts; in the first frame all have changed
         self._limit = -math.inf  # the largest raw count under a touch, at which a sound taxel may stand still
 
     def learn(self, *, fine: bool) -> None:
@@ -49,14 +49,15 @@ class Frozen:
 
         Called while the sensor is touched, and later as long as a taxel is frozen.
         """
-        changed = raw != self._previous
+        since = self._still_since
+        since[raw != self._previous] = t
         self._previous = raw
-        self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
         if not self._tells:
             return False
-        self._limit = max(self._limit, float(raw.max()))
-        still = t - self._still_since >= FROZEN_S
-        frozen = still & (above > FROZEN_NOISE * sigma) & (raw < self._limit)
+        self._limit = max(self._limit, raw.item(raw.argmax()))
+        if not self.any and t - since.item(since.argmin()) < FROZEN_S:  # most frames end here
+            return False
+        frozen = (t - since >= FROZEN_S) & (above > FROZEN_NOISE * sigma) & (raw < self._limit)
         if not (frozen != self.mask).any():
             return False
         self._set(frozen)
@@ -106,6 +107,8 @@ class Flickering:
         if not self.any and back.item(back.argmin()) > -clear * clear:  # most frames end here
             return False
         turned = (back < 0) & (np.minimum(np.abs(jump), np.abs(before)) > np.maximum(TURN_SHARE * self._peak, clear))
+        if not (self.any or np.count_nonzero(turned) or self._turns.item(self._turns.argmax()) >= TURNS):
+            return False
         self._turns = np.where(self._frames - self._turned < TURN_FRAMES, self._turns, 0) + turned
         self._turned[turned] = self._frames
         mask = self.mask & (self._frames - self._turned < STEADY_FRAMES)
@@ -155,8 +158,10 @@ class Taxels:
         if len(frames) < 2:
             return np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool)
         peaks = frames.max(axis=0)
+        still = peaks == frames.min(axis=0)
+        if not still.any():
+            return still, still
         around = neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
-        still = np.ptp(frames, axis=0) == 0
         return still, still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
 
     def judge(self, seen: Still) -> bool:
