@@ -91,12 +91,14 @@ class Idle:
         if self.provisional:
             return False
         jumps = np.abs(raw - self.compared)
-        jumps = jumps[jumps > 0]
+        jumps.sort()
+        moved = int(np.count_nonzero(jumps))  # the taxels that did not move are sorted before them
+        usual = (jumps.item(-(moved // 2) - 1) + jumps.item(-((moved + 1) // 2))) / 2  # the median of those that moved
         self.glance, self.compared = t + GLANCE_S, raw
-        if jumps.size and QUIETER * median(jumps) >= self.learned:
+        if moved and QUIETER * usual >= self.learned:
             self.quieter = 0
-        elif jumps.size or self.lively:
-            self.quieter += GLANCE if jumps.size else GLANCE_REPEATED
+        elif moved or self.lively:
+            self.quieter += GLANCE if moved else GLANCE_REPEATED
         if self.doubtful:
             self.doubt()
         return self.doubtful
