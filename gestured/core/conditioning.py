@@ -99,14 +99,19 @@ class Conditioner:
 
     def place(self, look: Look) -> tuple[float, float]:
         """Where a frame is pressed, its centroid (row, column); bad taxels are left out."""
-        return self.activity.place(np.where(self.weight > 0, look.above, 0.0), self.idle.level)
+        return self.activity.place(self._good(look.above), self.idle.level)
 
     def wide(self, look: Look) -> bool:
         """Whether what presses is, or was a moment ago, wider than fingers: an arm, a hand, a body, a thing."""
-        pressed = look.above * (self.weight > 0)
-        if int(np.count_nonzero(pressed >= WIDE_PEAK * pressed.max())) >= max(WIDE_TAXELS, WIDE * pressed.size):
+        pressed = self._good(look.above)
+        wide = pressed >= WIDE_PEAK * pressed.item(pressed.argmax())
+        if np.count_nonzero(wide) >= max(WIDE_TAXELS, WIDE * pressed.size):
             self._wide_at = look.t
         return 0 <= look.t - self._wide_at < WIDE_S
+
+    def _good(self, above: Array) -> Array:
+        """(N,) counts with 0 for bad taxels."""
+        return np.where(self.taxels.bad, 0.0, above) if self.taxels.count else above
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> bool:
         """Offer a frame that may be idle; true if the sensor was learned from the second that ends with it.
