@@ -187,8 +187,10 @@ class FrontEnd:
 
     def wait(self, t: float) -> list[Found]:
         """No frame has come until `t` s: a contact may be over. A later frame finds the same."""
-        until, over = min(t, self.pace.sure), self.segmenter.over
-        return [] if over is None or over > until else self._done(self.segmenter.wait(until, until), t)
+        over = self.segmenter.over
+        if over is None or over > (until := min(t, self.pace.sure)):
+            return []
+        return self._done(self.segmenter.wait(until, until), t)
 
     @property
     def fleeting(self) -> bool:
@@ -244,7 +246,8 @@ class FrontEnd:
             found += self.flush(t)
         elif segmenter.phase.touched:
             found += self.wait(t)
-            found += self._done(segmenter.wait(t, self.pace.sure), t)
+            if deeds := segmenter.wait(t, self.pace.sure):
+                found += self._done(deeds, t)
         self.pace.take(t, step, after_silence=step > self.timing.stale_s)
         if not segmenter.phase.touched:
             segmenter.after.fade(t)

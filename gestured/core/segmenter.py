@@ -296,8 +296,8 @@ class Segmenter:
     @property
     def over(self) -> float | None:
         """When the present wait is over unless the finger comes back, in s; None if there is no wait."""
-        wait, since = self.phase.wait, self.quiet_since
-        return since + float(getattr(self.timing, wait)) if wait and since is not None else None
+        since = self.quiet_since
+        return since + float(getattr(self.timing, wait)) if since is not None and (wait := self.phase.wait) else None
 
     def wait(self, t: float, sure: float) -> list[Deed]:
         """What the time alone decides until `t` s. Call it before `push`: a late frame cannot join what is over.

@@ -338,7 +338,8 @@ class Sensor:
 
     def elapse(self, now: float, facts: list[Fact]) -> None:
         """No frame has come until `now` (s): a contact may be over."""
-        self._run(self.wait, now, facts)
+        if self._foresight.asked or self.front_end.due is not None:
+            self._run(self.wait, now, facts)
 
     def end(self, now: float, facts: list[Fact]) -> None:
         """The sensor has fallen silent: its open contact is answered or cancelled."""

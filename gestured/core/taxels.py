@@ -107,10 +107,11 @@ class Flickering:
         if not self.any and back.item(back.argmin()) > -clear * clear:  # most frames end here
             return False
         turned = (back < 0) & (np.minimum(np.abs(jump), np.abs(before)) > np.maximum(TURN_SHARE * self._peak, clear))
-        if not (self.any or np.count_nonzero(turned) or self._turns.item(self._turns.argmax()) >= TURNS):
-            return False
-        self._turns = np.where(self._frames - self._turned < TURN_FRAMES, self._turns, 0) + turned
+        self._turns *= self._frames - self._turned < TURN_FRAMES
+        self._turns += turned
         self._turned[turned] = self._frames
+        if not self.any and self._turns.item(self._turns.argmax()) < TURNS:  # and most of the others here
+            return False
         mask = self.mask & (self._frames - self._turned < STEADY_FRAMES)
         often = self._turns >= (TURNS_TOO if self.any else TURNS)
         if often.any():
