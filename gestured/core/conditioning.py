@@ -75,7 +75,7 @@ class Conditioner:
         if bare is None:
             return None
         counts, sigma = bare
-        weight = self._weigh(sigma)
+        weight = self._weigh(sigma, float(median(sigma)))
         left = (look.raw - counts) * weight
         rested = self.activity.measure((idle.counts - counts) * weight)[0]
         if left.min() < -max(self.deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
@@ -90,7 +90,7 @@ class Conditioner:
         if self.idle.bare is None:
             return 0.0, 0.0
         counts, sigma = self.idle.bare
-        load = (self.idle.counts - counts) * self._weigh(sigma)
+        load = (self.idle.counts - counts) * self._weigh(sigma, float(median(sigma)))
         return float(np.count_nonzero(load > LOADED)) / load.size, self.activity.measure(load)[0]
 
     def fallen(self, look: Look) -> float:
@@ -109,9 +109,9 @@ class Conditioner:
             self._wide_at = look.t
         return 0 <= look.t - self._wide_at < WIDE_S
 
-    def _good(self, above: Array) -> Array:
-        """(N,) counts with 0 for bad taxels."""
-        return np.where(self.taxels.bad, 0.0, above) if self.taxels.count else above
+    def _good(self, values: Array) -> Array:
+        """(N,) values with 0 for bad taxels."""
+        return np.where(self.taxels.bad, 0.0, values) if self.taxels.count else values
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> bool:
         """Offer a frame that may be idle; true if the sensor was learned from the second that ends with it.
@@ -172,11 +172,11 @@ class Conditioner:
         idle = self.idle
         self.taxels.review(idle.sigma, idle.level)
         self.activity.review()
-        self.weight = self._weigh(idle.sigma)
+        self.weight = self._weigh(idle.sigma, idle.level)
 
-    def _weigh(self, sigma: Array) -> Array:
-        """(N,) noise units of one count of each taxel, by its standard deviation `sigma` (counts); 0 if it is bad."""
-        return np.where(self.taxels.bad, 0.0, weigh(sigma, float(median(sigma)), self.activity.scale))
+    def _weigh(self, sigma: Array, level: float) -> Array:
+        """(N,) noise units of one count of each taxel, as `weigh` gives them; 0 if it is bad."""
+        return self._good(weigh(sigma, level, self.activity.scale))
 
 
 def weigh(sigma: Array, level: float | Array, scale: float | Array) -> Array:

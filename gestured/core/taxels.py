@@ -150,9 +150,9 @@ class Taxels:
     def review(self, sigma: Array, noise: float) -> None:
         """Find the bad taxels by each one's noise (N,) and the sensor's. If all taxels are bad, none counts as bad."""
         self.bad = self._stuck | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
-        if self.bad.all():
-            self.bad = np.zeros_like(self.bad)
         self.count = int(np.count_nonzero(self.bad))
+        if self.count == self.bad.size:
+            self.bad, self.count = np.zeros_like(self.bad), 0
 
     def inspect(self, frames: Array, noise: float) -> Still:
         """The taxels that stood still in the frames of a contact: (T, N) counts above the baseline, not bridged."""
