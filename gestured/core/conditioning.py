@@ -50,6 +50,7 @@ class Conditioner:
         self.activity = Activity(rows, columns)
         self.taxels = Taxels(rows, columns)
         self.weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
+        self._wide = max(WIDE_TAXELS, WIDE * (rows * columns))  # so many taxels that are pressed are more than fingers
         self._wide_at = -math.inf  # s, when what presses was last wider than fingers
         self.deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
 
@@ -104,8 +105,7 @@ class Conditioner:
     def wide(self, look: Look) -> bool:
         """Whether what presses is, or was a moment ago, wider than fingers: an arm, a hand, a body, a thing."""
         pressed = self._good(look.above)
-        wide = pressed >= WIDE_PEAK * pressed.item(pressed.argmax())
-        if np.count_nonzero(wide) >= max(WIDE_TAXELS, WIDE * pressed.size):
+        if np.count_nonzero(pressed >= WIDE_PEAK * pressed.item(pressed.argmax())) >= self._wide:
             self._wide_at = look.t
         return 0 <= look.t - self._wide_at < WIDE_S
 

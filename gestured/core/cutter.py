@@ -152,8 +152,7 @@ class Cutter:
         kept, conditioner = list(self.kept), self._conditioner
         times = np.array([frame.t for frame in kept])
         stack = np.array([frame.above for frame in kept])
-        first = int(np.searchsorted(times, onset))
-        last = int(np.searchsorted(times, offset))
+        first, last = int(times.searchsorted(onset)), int(times.searchsorted(offset))
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
         bad = conditioner.taxels.bad.reshape(frames.shape[1:])

@@ -179,25 +179,21 @@ class Taxels:
         return changed
 
     def bridge(self, frames: Array) -> Array:
-        """(T, N) -> (T, R, C) with the bad taxels replaced by what their good neighbours show."""
-        return bridged(frames.reshape(-1, self.rows, self.columns), self.bad.reshape(self.rows, self.columns))
+        """(T, N) -> (T, R, C) with the bad taxels replaced by what their good neighbours show.
 
-
-def bridged(frames: Array, bad: Mask) -> Array:
-    """(T, R, C) counts -> the same with the (R, C) bad taxels replaced by what their good neighbours show.
-
-    A patch of bad taxels is filled from its rim inwards. If no taxel is good, nothing is replaced.
-    """
-    good = ~bad
-    if good.all() or not good.any():
+        A patch of bad taxels is filled from its rim inwards.
+        """
+        frames = frames.reshape(-1, self.rows, self.columns)
+        if not self.count:
+            return frames
+        good = ~self.bad.reshape(self.rows, self.columns)
+        frames = np.where(good, frames, 0.0)
+        while not good.all():
+            around = neighbour_mean(frames, good)
+            fill = ~good & (neighbour_mean(good.astype(float), np.ones_like(good)) > 0)
+            frames = np.where(fill, around, frames)
+            good = good | fill
         return frames
-    frames = np.where(good, frames, 0.0)
-    while not good.all():
-        around = neighbour_mean(frames, good)
-        fill = ~good & (neighbour_mean(good.astype(float), np.ones_like(good)) > 0)
-        frames = np.where(fill, around, frames)
-        good = good | fill
-    return frames
 
 
 def neighbour_mean(grid: NDArray[np.floating], good: Mask) -> Array:

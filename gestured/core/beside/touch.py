@@ -150,7 +150,7 @@ class Fingers:
         self._looked = look.t
         conditioner = front_end.conditioner
         taxels, noise = conditioner.taxels, conditioner.idle.level
-        frame = taxels.bridge(look.above[None]).ravel() if taxels.count else look.above
+        frame = taxels.bridge(look.above[None]).ravel()
         if lying is None:
             return self._follow([] if phase.let_go else spots(frame, self._shape, noise), look.t)
         frame = frame.reshape(self._shape)
