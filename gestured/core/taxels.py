@@ -198,10 +198,9 @@ class Taxels:
 
 def neighbour_mean(grid: NDArray[np.floating], good: Mask) -> Array:
     """(..., R, C) -> the weighted mean of each taxel's neighbours, of the (R, C) good ones; 0 if none is good."""
-    pad = [(0, 0)] * (grid.ndim - 2) + [(1, 1), (1, 1)]
-    values = np.pad(np.where(good, grid, 0.0), pad)
-    weight = np.pad(good.astype(float), 1)
     rows, columns = good.shape
+    values, weight = np.zeros((*grid.shape[:-2], rows + 2, columns + 2)), np.zeros((rows + 2, columns + 2))
+    values[..., 1:-1, 1:-1], weight[1:-1, 1:-1] = np.where(good, grid, 0.0), good
     total = np.zeros(grid.shape)
     count = np.zeros(good.shape)
     for i in range(3):
