@@ -140,8 +140,7 @@ class Cutter:
             if made[0].bad is not None and np.array_equal(made[0].bad.reshape(-1), taxels.bad):
                 return made
         segment, stack = self.segment(onset, offset)
-        still = taxels.inspect(stack[segment.first : segment.last + 1], self._conditioner.idle.level)
-        self._made = segment, still
+        self._made = segment, taxels.inspect(stack[segment.first : segment.last + 1], self._conditioner.idle.level)
         return self._made
 
     def segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
@@ -156,8 +155,7 @@ class Cutter:
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
         bad = conditioner.taxels.bad.reshape(frames.shape[1:])
-        segment = Segment(frames, times, first, last, conditioner.idle.level, lost, self._before, bad)
-        return segment, stack
+        return Segment(frames, times, first, last, conditioner.idle.level, lost, self._before, bad), stack
 
 
 def bearable_s(interval_s: float) -> float:

@@ -187,10 +187,8 @@ class FrontEnd:
 
     def wait(self, t: float) -> list[Found]:
         """No frame has come until `t` s: a contact may be over. A later frame finds the same."""
-        over = self.segmenter.over
-        if over is None or over > (until := min(t, self.pace.sure)):
-            return []
-        return self._done(self.segmenter.wait(until, until), t)
+        until, over = min(t, self.pace.sure), self.segmenter.over
+        return [] if over is None or over > until else self._done(self.segmenter.wait(until, until), t)
 
     @property
     def fleeting(self) -> bool:
@@ -246,8 +244,7 @@ class FrontEnd:
             found += self.flush(t)
         elif segmenter.phase.touched:
             found += self.wait(t)
-            if deeds := segmenter.wait(t, self.pace.sure):
-                found += self._done(deeds, t)
+            found += self._done(segmenter.wait(t, self.pace.sure), t)
         self.pace.take(t, step, after_silence=step > self.timing.stale_s)
         if not segmenter.phase.touched:
             segmenter.after.fade(t)

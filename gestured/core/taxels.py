@@ -49,23 +49,20 @@ class Frozen:
 
         Called while the sensor is touched, and later as long as a taxel is frozen.
         """
-        since = self._still_since
-        since[raw != self._previous] = t
+        self._still_since[raw != self._previous] = t
         self._previous = raw
         if not self._tells:
             return False
         self._limit = max(self._limit, raw.item(raw.argmax()))
-        if not self.any and t - since.item(since.argmin()) < FROZEN_S:  # most frames end here
+        if not self.any and t - self._still_since.item(self._still_since.argmin()) < FROZEN_S:  # most frames end here
             return False
-        frozen = (t - since >= FROZEN_S) & (above > FROZEN_NOISE * sigma) & (raw < self._limit)
-        if not (frozen != self.mask).any():
-            return False
-        self._set(frozen)
-        return True
+        frozen = (t - self._still_since >= FROZEN_S) & (above > FROZEN_NOISE * sigma) & (raw < self._limit)
+        return self._set(frozen)
 
-    def _set(self, mask: Mask) -> None:
-        self.mask = mask
-        self.any = bool(mask.any())
+    def _set(self, mask: Mask) -> bool:
+        changed = bool((mask != self.mask).any())
+        self.mask, self.any = mask, bool(mask.any())
+        return changed
 
 
 class Flickering:
@@ -156,12 +153,10 @@ class Taxels:
 
     def inspect(self, frames: Array, noise: float) -> Still:
         """The taxels that stood still in the frames of a contact: (T, N) counts above the baseline, not bridged."""
-        if len(frames) < 2:
-            return np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool)
         peaks = frames.max(axis=0)
         still = peaks == frames.min(axis=0)
-        if not still.any():
-            return still, still
+        if len(frames) < 2 or not still.any():
+            return still, np.zeros_like(still)
         around = neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
         return still, still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
 

@@ -52,10 +52,8 @@ class Foresight:
 
     def due(self, front_end: FrontEnd) -> float | None:
         """When a finger that has left will have been off for `DRAFT_S`, in s; None if that was shown already."""
-        if not self.asked or not front_end.segmenter.phase.let_go:
-            return None
         offset = front_end.segmenter.last_touched
-        return offset + DRAFT_S if self._left != offset else None
+        return offset + DRAFT_S if self.asked and front_end.segmenter.phase.let_go and self._left != offset else None
 
     def see(self, front_end: FrontEnd, t: float) -> None:
         """Take note of a frame at `t` s, and set `wanted` if a model is to look at the open contact.
