@@ -40,6 +40,7 @@ SCALAR_BYTES = 48  # memory that Python takes for a scalar in a slot
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
 _TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
+_IMMEDIATELY = b"\0\0\0\0\0\0\0\1"
 _NTP_EPOCH = 2_208_988_800  # s, 1970 counted from 1900; the count begins anew in 2036, so we tell 1970 to 2106
 
 
@@ -73,9 +74,10 @@ def timetag(data: bytes, at: int, end: int) -> float | None:
 
 def timetags(rows: NDArray[np.uint8]) -> NDArray[np.float64]:
     """What `timetag` gives of each of (n, 8) bytes, (n,) s; NaN for "immediately"."""
-    seconds, fraction = rows.view(">u4").astype(np.int64).T
-    found: NDArray[np.float64] = ((seconds - _NTP_EPOCH) & 0xFFFFFFFF) + fraction * 2.0**-32
-    found[rows.view(">u8")[:, 0] == 1] = np.nan
+    seconds, fraction = rows.view(">u4").astype(np.uint32).T
+    found: NDArray[np.float64] = (seconds - _NTP_EPOCH) + fraction * 2.0**-32
+    if _IMMEDIATELY in rows.tobytes():
+        found[(seconds == 0) & (fraction == 1)] = np.nan
     return found
 
 

@@ -123,8 +123,8 @@ class _Meaning(NamedTuple):
     slot: Slot  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
     form: int  # the same number for layouts with heads and frame in the same places, of the same type and grid
-    heads: bytes  # the heads of all its messages, joined
-    places: tuple[slice, ...]  # where each of these heads stands in the packet
+    heads: bytes  # the heads of all its messages, and the size of a blob, joined
+    places: tuple[tuple[int, int], ...]  # the bytes at which each of them begins and ends in the packet
 
 
 class Decoder:
@@ -204,13 +204,15 @@ class Decoder:
         dtype = slot.dtype if slot.dtype is not None else _BLOBS.get(slot.length / (rows * columns))
         if dtype is None or any(other.blob for other in layout.slots if other is not slot):
             return False
-        heads = tuple((other.start, len(other.head)) for other in layout.slots)
-        form = layout.length, heads, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
+        heads = [(other.start, other.head) for other in layout.slots]
+        if slot.blob:  # the size that stands before it
+            heads.append((slot.run - 4, slot.length.to_bytes(4, "big")))
+        places = tuple([(start, start + len(head)) for start, head in heads])
+        form = layout.length, places, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
         number = self._forms.setdefault(form, next(self._numbers))
-        places = tuple(slice(start, start + length) for start, length in heads)
-        return _Meaning(route, slot, dtype, number, b"".join([other.head for other in layout.slots]), places)
+        return _Meaning(route, slot, dtype, number, b"".join([head for _, head in heads]), places)
 
     def _find_route(self, address: str, types: str) -> _Route:
         matched = self._addresses.match(address)
@@ -297,17 +299,13 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
     found, meanings = zip(*members, strict=True)
     route, slot, dtype, _, _, places = meanings[0]
     assert route.grid is not None
-    taxels, end = math.prod(route.grid), slot.run + (slot.length if slot.blob else slot.length * dtype.itemsize)
-    block, heads = (
-        np.frombuffer(b"".join(some), np.uint8).reshape(len(members), -1)
-        for some in ([packets[i] for i in found], [meaning.heads for meaning in meanings])
-    )
-    raw = block[:, slot.run : end].view(dtype)
+    taxels, size = math.prod(route.grid), slot.length if slot.blob else slot.length * dtype.itemsize
+    block = np.frombuffer(b"".join([packets[i] for i in found]), np.uint8).reshape(len(found), -1)
+    raw = block[:, slot.run : slot.run + size].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
-    good = [np.isfinite(values), heads == np.concatenate([block[:, place] for place in places], axis=1)]
+    finite = np.isfinite(values)
+    heads = np.hstack([block[:, begin:end] for begin, end in places])
     counters = tags = None
-    if slot.blob:
-        good.append(block[:, slot.run - 4 : slot.run].view(">u4") == slot.length)
     if route.counted:
         first = raw if slot.unpack is None else block[:, slot.scalars : slot.scalars + 4].view(">i4")
         counters = first[:, 0].astype(np.int64)
@@ -315,9 +313,11 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
         tags = osc.timetags(block[:, 8:16])
     sensors = [meaning.route.sensor for meaning in meanings]
     read = Block(list(found), sensors, values.reshape(-1, *route.grid), counters, tags)
-    if all(each.all() for each in good):  # much faster than row by row
+    expected = b"".join([meaning.heads for meaning in meanings])
+    if heads.tobytes() == expected and 0 not in finite.tobytes():  # much faster than row by row
         return read
-    return read.only(np.logical_and.reduce([each.all(axis=1) for each in good]).nonzero()[0])
+    same = heads == np.frombuffer(expected, np.uint8).reshape(heads.shape)
+    return read.only((same.all(axis=1) & finite.all(axis=1)).nonzero()[0])
 
 
 def _joined(blocks: list[Block]) -> Block:
