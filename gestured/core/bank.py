@@ -7,8 +7,8 @@ last bit: `matmul` of a stack of grids gives what `dot` gives for each, and expo
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import repeat
+from collections.abc import Sequence
+from itertools import combinations, repeat
 from typing import Any
 
 import numpy as np
@@ -44,18 +44,21 @@ from gestured.core.wire import Block
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Sender = tuple[str, Source]  # a sensor, and the source that owns it or has sent a frame
 
+NOBODY: Sender = "", ("", 0)  # in no bank
 FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
 # The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for.
 NAMES = (
-    "last", "arrived", "tag", "counter", "interval", "jitter",
+    "last", "new", "gap", "arrived", "tag", "counter", "interval", "jitter",
     "glance", "learned", "quieter", "lively", "reviewed", "step", "level",
-    "usual", "scale", "active", "new", "count",
+    "usual", "scale", "active", "count",
     "expected", "before", "pause", "came",
 )  # fmt: skip
-KNOWN = np.dtype([(name, np.float64) for name in NAMES])
+WHEN = slice(3)  # the first three of them, which are kept of the last frames
+COLUMN = {name: n for n, name in enumerate(NAMES)}
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # tables by taxel: of `Idle`, `Conditioner`, and the last frame sent
 
 
@@ -110,21 +113,24 @@ class Banks:
         `sources` are those of all packets. `others`: sensors of other packets, which must not be overtaken.
         """
         left: dict[int, tuple[Block, int]] = {}
-        names, arrived = set[str](), dict[int, list[str]]()  # `arrived`: sensors by how many frames were lost before
+        arrived: dict[int, list[str]] = {}  # sensors by how many frames were lost before
+        for one, other in combinations(blocks, 2):
+            others = others.union(set(one.sensors).intersection(other.sensors))
         for block in blocks:
-            others = others.union(names.intersection(block.sensors))
-            names.update(block.sensors)
-        for block in blocks:
-            waits = np.ones(len(block.packets), np.bool_)
+            senders = list(zip(block.sensors, map(sources.__getitem__, block.packets), strict=True))
+            if others:
+                senders = [NOBODY if sender[0] in others else sender for sender in senders]
+            lost = np.full(len(senders), -1)
             for bank in self._banks.values():
                 try:
-                    for taken, lost in bank.take(block, sources, others, self.doubted, now):
-                        for n, before in zip(taken, lost, strict=True):
-                            arrived.setdefault(before, []).append(block.sensors[n])
-                        waits[taken] = False
+                    bank.take(block, senders, self.doubted, now, lost)
                 except Exception as error:  # after a bug, the frames that are left are taken one by one
                     facts.append(Fault(None, error))
-            left |= {block.packets[n]: (block, n) for n in waits.nonzero()[0].tolist()}
+            for n, (name, before) in enumerate(zip(block.sensors, lost.tolist(), strict=True)):
+                if before < 0:
+                    left[block.packets[n]] = block, n
+                else:
+                    arrived.setdefault(before, []).append(name)
         facts += [Arrived(tuple(each), 1, lost, 0, 0, 0) for lost, each in arrived.items()]
         return left
 
@@ -135,17 +141,18 @@ class Bank:
     def __init__(self, front: FrontEnd, by_tag: int, depth: int) -> None:
         """A bank for sensors with front ends like this one, which keeps the last `depth` frames of each."""
         self._by_tag, self._least_s = by_tag, max(LEAD_S / depth, Stamper.MIN_STEP_S)  # least interval between frames
+        self._most_s = min(front.timing.stale_s, 0.99 * Stamper.MAX_STEP_S)  # most; rounding must not pass the limit
         self._front, self._activity = front, Activity(front.rows, front.columns)  # for what all sensors share
         taxels = front.rows * front.columns
         self._sensors: dict[str, Sensor] = {}
-        self._rows: dict[str, int] = {}
         self._owners: dict[str, Source] = {}
+        self._rows: dict[Sender, int] = {}
         self._recover: dict[int, AfterEffect] = {}  # by row of a sensor that recovers from a contact
         self._free = list(range(FIRST_ROWS))
-        self._known = np.zeros(FIRST_ROWS, KNOWN)
+        self._known = np.zeros((FIRST_ROWS, len(NAMES)))
         self._taxels = [np.zeros((FIRST_ROWS, taxels)) for _ in range(5)]
         self._above = np.zeros((FIRST_ROWS, depth, taxels))  # counts of the last frames, of which the cutter keeps some
-        self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s, by frame: its time, `Kept.new`, the interval
+        self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s, by frame: its time, `Kept.new`, its interval
 
     def __len__(self) -> int:
         """How many sensors are in the bank."""
@@ -162,11 +169,12 @@ class Bank:
             self._taxels = [_twice(table) for table in self._taxels]
         row = self._free[-1]
         self._known[row] = (
-            stamper.last, stamper.arrived, math.nan if stamper.tag is None else stamper.tag,
+            stamper.last, front.cutter.new, 0.0, stamper.arrived,  # 0: the interval before the last frame
+            math.nan if stamper.tag is None else stamper.tag,
             math.nan if stamper.counter is None else stamper.counter,
             front.pace.interval_s, vitals.jitter_s,
             idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
-            activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # 0: activity, and frames taken here
+            activity.usual, activity.scale, 0.0, 0,  # 0: activity, and frames taken here
             vitals.interval_s, *vitals.together,
         )  # fmt: skip
         assert front.last_sent is not None
@@ -177,18 +185,17 @@ class Bank:
         if steps := stamper.intervals:
             self._when[row, -len(steps) :, 2] = steps
         self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
-        if front.segmenter.after.recovering(self._known["last"][row]):
+        if front.segmenter.after.recovering(self._known[row, COLUMN["last"]]):
             self._recover[row] = front.segmenter.after
-        self._rows[sensor.name] = self._free.pop()
+        self._rows[sensor.name, sensor.owner.source] = self._free.pop()
 
     def leave(self, name: str) -> None:
         """Move what is known of a sensor back into its objects."""
-        row, sensor = self._rows.pop(name), self._sensors.pop(name)
-        del self._owners[name]
+        row, sensor = self._rows.pop((name, self._owners.pop(name))), self._sensors.pop(name)
         self._recover.pop(row, None)
         self._free.append(row)
-        (last, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
-         usual, scale, active, new, count, _, *together) = self._known[row].item()  # fmt: skip
+        (last, new, _, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
+         usual, scale, active, count, _, *together) = self._known[row].tolist()  # fmt: skip
         if not count:
             return
         front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
@@ -224,7 +231,8 @@ class Bank:
     def show(self) -> None:
         """Copy what readings tell, and when sensors were heard, into their objects."""
         rows = list(self._rows.values())
-        known = self._known[["last", "arrived", "interval", "jitter", "level"]][rows].tolist()
+        told = [COLUMN[name] for name in ("last", "arrived", "interval", "jitter", "level")]
+        known = self._known[rows][:, told].tolist()
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
             self._sensors.values(), self._taxels[COUNTS][rows], known, strict=True
         ):
@@ -235,51 +243,38 @@ class Bank:
 
     def review(self) -> None:
         """All sensors were reviewed: from now on jitter is computed with their present intervals."""
-        self._known["expected"] = self._known["interval"]
+        self._known[:, COLUMN["expected"]] = self._known[:, COLUMN["interval"]]
 
     def take(
-        self, block: Block, sources: Sequence[Source], others: set[str], doubted: set[str], now: float
-    ) -> Iterator[tuple[list[int], list[int]]]:
-        """Take the idle frames of a block, at most one of each sensor at a time.
-
-        Yields for each time the places in the block of the frames that were taken, and how many were lost before each.
-        """
-        if block.values.shape[1:] != self._front.grid_sent:
+        self, block: Block, senders: Sequence[Sender], doubted: set[str], now: float, lost: NDArray[np.intp]
+    ) -> None:
+        """Take the idle frames of a block. `lost` (n,) gets how many were lost just before each that was taken."""
+        if block.values.shape[1:] != self._front.grid_sent or (self._by_tag and block.tags is None):
             return
-        owners, sent = map(self._owners.get, block.sensors), map(sources.__getitem__, block.packets)
-        mine = np.array([source == owner for source, owner in zip(sent, owners, strict=True)])
-        if others:
-            mine &= [name not in others for name in block.sensors]
-        rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
-        frames = np.bincount(rows[mine], minlength=len(self._known))
-        if not self._by_tag:
-            mine &= frames[rows] == 1  # several frames of one sensor share their time of arrival
-        elif block.tags is not None and (several := (mine & (frames[rows] > 1)).nonzero()[0]).size:
-            # A sensor with a coarse clock gives several frames one time tag; its own stamper spaces these.
-            order = several[np.lexsort((block.tags[several], rows[several]))]
-            row, tag = rows[order], block.tags[order]
-            if (same := (row[1:] == row[:-1]) & (tag[1:] == tag[:-1])).any():
-                mine &= ~np.isin(rows, row[1:][same])
-        left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
-        while len(left):
-            first.fill(-1)
-            first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since numpy keeps what is assigned last
-            turn = first[first >= 0]
+        rows = np.fromiter(map(self._rows.get, senders, repeat(-1)), np.intp, len(senders))
+        mine = (rows >= 0).nonzero()[0]
+        places = mine[rows[mine].argsort(kind="stable")]  # by row, and those of one row as they arrived
+        begins, ends = _runs(rows[places])
+        if len(begins) < len(places):
+            # Several frames that arrive together share a time, unless each has a later time tag than the one before it.
+            # A sensor's own stamper spaces such frames.
+            tags = block.tags[places] if self._by_tag and block.tags is not None else np.zeros(len(places))
+            later = np.concatenate(([True], tags[1:] > tags[:-1]))
+            later[begins] = True
+            places = places[np.repeat(np.logical_and.reduceat(later, begins), ends - begins)]
+            begins, ends = _runs(rows[places])
+        while len(begins):  # one frame of each row at a time
+            turn = places[begins]
             doubts = np.array([block.sensors[n] in doubted for n in turn.tolist()]) if doubted else None
-            lost = self._take(block, turn, rows[turn], doubts, now)
-            taken, lost = turn[lost >= 0], lost[lost >= 0]
-            for n in (lost > 0).nonzero()[0].tolist():  # as `Sensor.receive` counts them
-                sensor = self._sensors[block.sensors[taken[n]]]
+            lost[turn] = found = self._take(block, turn, rows[turn], doubts, now)
+            for n in turn[found > 0].tolist():  # as `Sensor.receive` counts them
+                sensor = self._sensors[block.sensors[n]]
                 sensor._lost, sensor._lost_at = sensor._lost + int(lost[n]), now
-            for name in doubted.intersection(map(block.sensors.__getitem__, taken.tolist())) if doubted else ():
+            for name in doubted.intersection([block.sensors[n] for n in turn[found >= 0].tolist()]) if doubted else ():
                 doubted.remove(name)
                 self._sensors[name].vitals.stretches = 0  # see `Vitals.arrived`
-            yield taken.tolist(), lost.tolist()
-            left = left[first[rows[left]] != left]
-            if len(left):
-                first.fill(-1)
-                first[rows[taken]] = taken
-                left = left[first[rows[left]] >= 0]
+            more = (found >= 0) & (begins + 1 < ends)
+            begins, ends = begins[more] + 1, ends[more]
 
     def _take(
         self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], doubts: Mask | None, now: float
@@ -289,27 +284,26 @@ class Bank:
         That number is -1 for a frame that was not taken. Frames that were lost while a sensor was idle change only its
         counts and intervals. `doubts`: (n,) whether this machine may have lost frames just before; None for no frame.
         """
-        front, known = self._front, _numbers(self._known).take(rows, axis=0)
-        (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
-         usual, scale, active, new, count, expected, before, pause, came) = known.T  # fmt: skip
-        tags, taken = math.nan if block.tags is None else block.tags[places], np.ones(len(rows), np.bool_)
-        t = np.zeros(len(rows)) + now
+        front, known = self._front, self._known.take(rows, axis=0)
+        (last, new, gap, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step,
+         level, usual, scale, active, count, expected, before, pause, came) = known.T  # fmt: skip
+        tags = math.nan if block.tags is None else block.tags.take(places)
+        t = last + (tags - tag) if self._by_tag else np.full(len(rows), now)
+        tag[:], since = tags, t - last
+        taken = (since >= self._least_s) & (np.maximum(since, now - arrived) <= self._most_s)
         if self._by_tag:
-            since = tags - tag
-            t = last + since
-            taken = (since > 0) & (since <= Stamper.MAX_STEP_S) & (t <= now + Stamper.AHEAD_S)
-        tag[:], since, lost = tags, t - last, np.zeros(len(rows), np.intp)
+            taken &= t <= now + Stamper.AHEAD_S
         if block.counters is None:
             taken &= np.isnan(counter)
+            gap[:], lost = since, np.zeros(len(rows))
             if doubts is not None:  # as many frames as fit into the pause count as lost, see `Stamper.stamp`
                 lost[doubts] = np.maximum(np.rint(since / self._usual(rows, count))[doubts] - 1, 0)
-            steps = np.ones(len(rows))
-        else:  # see `Stamper._count`
-            steps = (block.counters[places] - counter + 2**31) % 2**32 - 2**31
+        else:  # see `Stamper._count`; where a counter wraps, no frame is taken
+            steps = block.counters.take(places) - counter
             taken &= (steps >= 1) & (steps <= Stamper.LEAP)
-            counter[:], lost[taken] = block.counters[places], steps[taken] - 1
-        taken &= (since >= self._least_s) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
-        sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
+            counter += steps
+            gap[:], lost = since / np.maximum(steps, 1), steps - 1
+        sent = block.values.take(places, axis=0).reshape(len(rows), -1).astype(np.float64)
         raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.grid_sent))
 
         glanced = (taken & (t >= glance)).nonzero()[0]
@@ -329,9 +323,8 @@ class Bank:
         active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
         ago, tau = np.minimum(-since, 0.0), self._taus(rows, t)
-        followed, noted = _shares(np.concatenate((ago / tau, ago / NOISE_TAU_S))).reshape(2, -1)
-        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * noted
-        counts += above * followed[:, np.newaxis]
+        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago / NOISE_TAU_S)
+        counts += above * _shares(ago / tau)[:, np.newaxis]
         due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
         if due.size:
             sigma = self._taxels[SIGMA][rows[due]]
@@ -350,8 +343,8 @@ class Bank:
         moved = before + (np.abs(pause - came * expected) - before) * JITTER_SHARE
         np.copyto(jitter, moved, where=(expected > 0) & (pause < math.inf))
         interval += (since - interval) * SHARE
-        news = (_bytes(sent) != _bytes(self._taxels[SENT].take(rows, axis=0))) | (lively == 0)
-        np.copyto(new, t, where=news)
+        changed = sent.view(np.int64) != self._taxels[SENT].take(rows, axis=0).view(np.int64)  # compared bit by bit
+        np.copyto(new, t, where=changed.any(axis=1) | (lively == 0))
         last[:], arrived[:] = t, now
         # Nothing of a sensor has changed so far. From here on, what was found is stored for the frames that are taken.
         if glanced.size:
@@ -361,15 +354,14 @@ class Bank:
             fine = taken[due]
             due = rows[due[fine]]
             self._taxels[SIGMA][due], self._taxels[WEIGHT][due] = sigma[fine], weight[fine]
-        keep = slice(None) if taken.all() else taken
-        rows, slot = rows[keep], count[keep].astype(np.intp)
+        keep = taken if 0 in taken.tobytes() else slice(None)
+        rows, known, slot = rows[keep], known[keep], count[keep].astype(np.intp)
         self._above[rows, slot % self._above.shape[1]] = above[keep]
-        self._when[rows, slot % self._when.shape[1]] = np.array((t, new, since / np.maximum(steps, 1))).T[keep]
+        self._when[rows, slot % self._when.shape[1]] = known[:, WHEN]
         self._taxels[COUNTS][rows], self._taxels[SENT][rows] = counts[keep], sent[keep]
-        count += 1
-        _numbers(self._known)[rows] = known[keep]
-        lost[~taken] = -1
-        return lost
+        known[:, COLUMN["count"]] += 1
+        self._known[rows] = known
+        return np.where(taken, lost, -1).astype(np.intp)
 
     def _usual(self, rows: NDArray[np.intp], count: Array) -> Array:
         """(n,) s, the usual interval of n rows, of each of which `count` frames were taken here; see `Stamper`."""
@@ -404,23 +396,17 @@ def _calm(front: FrontEnd) -> bool:
     return front.calm or (known and front.segmenter.phase is IDLE)
 
 
-def _numbers(known: NDArray[Any]) -> Array:
-    """(n,) what is known of n sensors -> (n, len(NAMES)), a view whose rows are copied much faster."""
-    return known.view(np.float64).reshape(len(known), -1)
-
-
 def _twice(table: NDArray[Any]) -> NDArray[Any]:
     """A table with as many free rows more."""
     return np.concatenate([table, np.zeros_like(table)])
 
 
-def _bytes(rows: Array) -> NDArray[np.void]:
-    """(n, N) -> (n,), the bytes of each row, which numpy compares as one value."""
-    return rows.view(f"V{rows.itemsize * rows.shape[1]}")[:, 0]
-
-
 def _shares(ago: Array) -> Array:
     """(n,) shares of a difference by which a filter moves in (n,) times `-ago`, in units of its time constant."""
-    times = ago.tolist()
-    shares = {time: -math.expm1(time) for time in set(times)}  # sensors that are read together share their times
-    return np.array([shares[time] for time in times])
+    return -np.fromiter(map(math.expm1, ago.tolist()), np.float64, len(ago))
+
+
+def _runs(rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where the runs of equal numbers among (n,) begin, and where they end."""
+    edges = np.concatenate(([True], rows[1:] != rows[:-1], [True])).nonzero()[0] if len(rows) else rows
+    return edges[:-1], edges[1:]
