@@ -44,9 +44,9 @@ from gestured.core.wire import Block
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Sender = tuple[str, Source]  # a sensor, and the source that owns it or has sent a frame
 
-NOBODY: Sender = "", ("", 0)  # in no bank
+NOBODY: Source = "", 0  # owns no sensor
+NO_ROW = np.array([-1])
 FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
@@ -117,15 +117,19 @@ class Banks:
         for one, other in combinations(blocks, 2):
             others = others.union(set(one.sensors).intersection(other.sensors))
         for block in blocks:
-            senders = list(zip(block.sensors, map(sources.__getitem__, block.packets), strict=True))
-            if others:
-                senders = [NOBODY if sender[0] in others else sender for sender in senders]
-            lost = np.full(len(senders), -1)
+            senders = [sources[n] for n in block.packets]
+            for n, name in enumerate(block.sensors if others else ()):
+                if name in others:
+                    senders[n] = NOBODY
+            lost = np.zeros(len(senders), np.intp) - 1
             for bank in self._banks.values():
                 try:
                     bank.take(block, senders, self.doubted, now, lost)
                 except Exception as error:  # after a bug, the frames that are left are taken one by one
                     facts.append(Fault(None, error))
+            if not lost.any():  # nearly always
+                arrived.setdefault(0, []).extend(block.sensors)
+                continue
             for n, (name, before) in enumerate(zip(block.sensors, lost.tolist(), strict=True)):
                 if before < 0:
                     left[block.packets[n]] = block, n
@@ -146,7 +150,7 @@ class Bank:
         taxels = front.rows * front.columns
         self._sensors: dict[str, Sensor] = {}
         self._owners: dict[str, Source] = {}
-        self._rows: dict[Sender, int] = {}
+        self._rows: dict[tuple[str, Source], int] = {}  # by sensor and the source that owns it
         self._recover: dict[int, AfterEffect] = {}  # by row of a sensor that recovers from a contact
         self._free = list(range(FIRST_ROWS))
         self._known = np.zeros((FIRST_ROWS, len(NAMES)))
@@ -246,23 +250,26 @@ class Bank:
         self._known[:, COLUMN["expected"]] = self._known[:, COLUMN["interval"]]
 
     def take(
-        self, block: Block, senders: Sequence[Sender], doubted: set[str], now: float, lost: NDArray[np.intp]
+        self, block: Block, senders: Sequence[Source], doubted: set[str], now: float, lost: NDArray[np.intp]
     ) -> None:
         """Take the idle frames of a block. `lost` (n,) gets how many were lost just before each that was taken."""
         if block.values.shape[1:] != self._front.grid_sent or (self._by_tag and block.tags is None):
             return
-        rows = np.fromiter(map(self._rows.get, senders, repeat(-1)), np.intp, len(senders))
+        owners = zip(block.sensors, senders, strict=True)
+        rows = np.fromiter(map(self._rows.get, owners, repeat(-1)), np.intp, len(senders))
         mine = (rows >= 0).nonzero()[0]
         places = mine[rows[mine].argsort(kind="stable")]  # by row, and those of one row as they arrived
-        begins, ends = _runs(rows[places])
+        row = np.concatenate((NO_ROW, rows[places], NO_ROW))
+        edges = (row[1:] != row[:-1]).nonzero()[0]
+        begins, ends = edges[:-1], edges[1:]  # of the frames of each row
         if len(begins) < len(places):
             # Several frames that arrive together share a time, unless each has a later time tag than the one before it.
             # A sensor's own stamper spaces such frames.
             tags = block.tags[places] if self._by_tag and block.tags is not None else np.zeros(len(places))
             later = np.concatenate(([True], tags[1:] > tags[:-1]))
             later[begins] = True
-            places = places[np.repeat(np.logical_and.reduceat(later, begins), ends - begins)]
-            begins, ends = _runs(rows[places])
+            apart = np.logical_and.reduceat(later, begins)
+            begins, ends = begins[apart], ends[apart]
         while len(begins):  # one frame of each row at a time
             turn = places[begins]
             doubts = np.array([block.sensors[n] in doubted for n in turn.tolist()]) if doubted else None
@@ -322,9 +329,9 @@ class Bank:
         above = raw - counts
         active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
-        ago, tau = np.minimum(-since, 0.0), self._taus(rows, t)
+        ago = np.minimum(-since, 0.0)
         usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago / NOISE_TAU_S)
-        counts += above * _shares(ago / tau)[:, np.newaxis]
+        counts += above * _shares(ago / self._taus(rows, t))[:, np.newaxis]
         due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
         if due.size:
             sigma = self._taxels[SIGMA][rows[due]]
@@ -355,11 +362,12 @@ class Bank:
             due = rows[due[fine]]
             self._taxels[SIGMA][due], self._taxels[WEIGHT][due] = sigma[fine], weight[fine]
         keep = taken if 0 in taken.tobytes() else slice(None)
-        rows, known, slot = rows[keep], known[keep], count[keep].astype(np.intp)
+        slot = count[keep].astype(np.intp)
+        count += 1
+        rows, known = rows[keep], known[keep]
         self._above[rows, slot % self._above.shape[1]] = above[keep]
         self._when[rows, slot % self._when.shape[1]] = known[:, WHEN]
         self._taxels[COUNTS][rows], self._taxels[SENT][rows] = counts[keep], sent[keep]
-        known[:, COLUMN["count"]] += 1
         self._known[rows] = known
         return np.where(taken, lost, -1).astype(np.intp)
 
@@ -402,11 +410,11 @@ def _twice(table: NDArray[Any]) -> NDArray[Any]:
 
 
 def _shares(ago: Array) -> Array:
-    """(n,) shares of a difference by which a filter moves in (n,) times `-ago`, in units of its time constant."""
-    return -np.fromiter(map(math.expm1, ago.tolist()), np.float64, len(ago))
+    """(n,) shares of a difference by which a filter moves in (n,) times `-ago`, in units of its time constant.
 
-
-def _runs(rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where the runs of equal numbers among (n,) begin, and where they end."""
-    edges = np.concatenate(([True], rows[1:] != rows[:-1], [True])).nonzero()[0] if len(rows) else rows
-    return edges[:-1], edges[1:]
+    It is one share if all are alike, as for sensors that are read together again and again.
+    """
+    times = ago.tolist()
+    if times.count(times[0]) == len(times):
+        times = times[:1]
+    return -np.fromiter(map(math.expm1, times), np.float64, len(times))

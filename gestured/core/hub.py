@@ -93,7 +93,9 @@ class Hub:
         found: dict[int, list[Arrival]] = {}
         blocks = self._together(packets, facts) if together else []
         alone: Collection[int] = range(len(packets))
-        if blocks:
+        if sum([len(block.packets) for block in blocks]) == len(packets):
+            alone = ()
+        elif blocks:
             alone = sorted(set(alone).difference(*(block.packets for block in blocks)))
         for n in alone:
             found[n] = self._decode(*packets[n], facts)

@@ -177,18 +177,20 @@ class Decoder:
         A block holds what `decode` gives of each of its packets, in a fraction of the time. The caller has to give
         `decode` the packets that are in no block: few others are laid out as they are, or a value is not finite.
         """
-        alike: dict[int, list[tuple[int, _Meaning]]] = {}
+        meanings: dict[int, _Meaning] = {}  # by packet
+        alike: dict[int, list[int]] = {}  # packets by form
         for i, layout in enumerate(self._layouts.guess(packets)):
             if layout is not None and layout.length == len(packets[i]):
                 meaning: _Meaning | Literal[False] = layout.meaning
                 if meaning is None:
                     meaning = layout.meaning = self._meaning(layout)
                 if meaning:
-                    alike.setdefault(meaning.form, []).append((i, meaning))
+                    meanings[i] = meaning
+                    alike.setdefault(meaning.form, []).append(i)
         found: dict[tuple[object, ...], list[Block]] = {}
         for members in alike.values():
             if len(members) >= FEW:
-                one = _block(packets, members)
+                one = _block(packets, members, [meanings[i] for i in members])
                 key = one.values.shape[1:], one.values.dtype, one.counters is None, one.tags is None
                 found.setdefault(key, []).append(one)
         return [_joined(blocks) for blocks in found.values()]
@@ -294,9 +296,8 @@ def _frame(message: Message, route: _Route) -> Arrival:
     return _new(Arrival, (route.sensor, values.reshape(rows, columns), counter, message.timetag, ()))
 
 
-def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
+def _block(packets: Sequence[bytes], found: list[int], meanings: list[_Meaning]) -> Block:
     """The finite frames of packets that may be of one form; packets with other heads are left out."""
-    found, meanings = zip(*members, strict=True)
     route, slot, dtype, _, _, places = meanings[0]
     assert route.grid is not None
     taxels, size = math.prod(route.grid), slot.length if slot.blob else slot.length * dtype.itemsize
@@ -312,7 +313,7 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
     if slot.start:  # outside of a bundle a message begins at 0
         tags = osc.timetags(block[:, 8:16])
     sensors = [meaning.route.sensor for meaning in meanings]
-    read = Block(list(found), sensors, values.reshape(-1, *route.grid), counters, tags)
+    read = Block(found, sensors, values.reshape(-1, *route.grid), counters, tags)
     expected = b"".join([meaning.heads for meaning in meanings])
     if heads.tobytes() == expected and 0 not in finite.tobytes():  # much faster than row by row
         return read
