@@ -66,9 +66,10 @@ class Activity:
         return spot if spot > alone else alone, ordered.item(0)
 
     def measure_all(self, scaled: Array) -> tuple[Array, Array]:
-        """What `measure` gives for each of n sensors, by their (n, N) deviations: (n,) and (n,)."""
-        ordered = np.sort(scaled, axis=1)
+        """What `measure` gives for each of n sensors, by their (n, N) deviations, which it sorts: (n,) and (n,)."""
         spots = np.matmul(np.matmul(self._down, scaled.reshape(-1, self.rows, self.columns)), self._across)
+        ordered = scaled
+        ordered.sort(axis=1)
         common = np.minimum(np.maximum(ordered[:, ordered.shape[1] // 2], -COMMON), COMMON)
         strongest = spots.reshape(scaled.shape).max(axis=1) - common * BLOB_GAIN
         return np.maximum(strongest, ordered[:, -1] - common), ordered[:, 0]

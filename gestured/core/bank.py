@@ -296,8 +296,8 @@ class Bank:
          level, usual, scale, active, count, expected, before, pause, came) = known.T  # fmt: skip
         tags = math.nan if block.tags is None else block.tags.take(places)
         t = last + (tags - tag) if self._by_tag else np.full(len(rows), now)
-        tag[:], since = tags, t - last
-        taken = (since >= self._least_s) & (np.maximum(since, now - arrived) <= self._most_s)
+        tag[:], since, waited = tags, t - last, now - arrived
+        taken = (since >= self._least_s) & (np.maximum(since, waited) <= self._most_s)
         if self._by_tag:
             taken &= t <= now + Stamper.AHEAD_S
         if block.counters is None:
@@ -313,7 +313,7 @@ class Bank:
         sent = block.values.take(places, axis=0).reshape(len(rows), -1).astype(np.float64)
         raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.grid_sent))
 
-        glanced = (taken & (t >= glance)).nonzero()[0]
+        glanced = (t >= glance).nonzero()[0]
         if glanced.size:
             changes = raw[glanced] - self._taxels[COMPARED][rows[glanced]]
             loud = (np.abs(changes) * QUIETER >= learned[glanced, np.newaxis]).sum(axis=1)
@@ -329,22 +329,22 @@ class Bank:
         above = raw - counts
         active[:], lowest = self._activity.measure_all(above * self._taxels[WEIGHT].take(rows, axis=0))
         taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
-        ago = np.minimum(-since, 0.0)
-        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago / NOISE_TAU_S)
-        counts += above * _shares(ago / self._taus(rows, t))[:, np.newaxis]
-        due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
+        idle = np.maximum(since, 0.0)
+        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(idle, NOISE_TAU_S)
+        counts += above * _shares(idle, self._taus(rows, t))[:, np.newaxis]
+        due = (t - reviewed >= REVIEW_S).nonzero()[0]
         if due.size:
             sigma = self._taxels[SIGMA][rows[due]]
-            unseen = np.maximum(reviewed[due], t[due] - UNSEEN_S) - t[due]
-            sigma += (seen(above[due], sigma) - sigma) * _shares(unseen / NOISE_TAU_S)[:, np.newaxis]
+            unseen = t[due] - np.maximum(reviewed[due], t[due] - UNSEEN_S)
+            sigma += (seen(above[due], sigma) - sigma) * _shares(unseen, NOISE_TAU_S)[:, np.newaxis]
             sigma = np.maximum(sigma, step[due, np.newaxis] / 2)
             level[due], reviewed[due] = median(sigma.T), t[due]
             scale[due] = np.minimum(np.maximum(usual[due] / self._activity.typical, 1.0), USUAL_AT_MOST)
-            taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else a taxel is bad
+            taken[due] &= np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else a taxel is bad
             weight = weigh(sigma, level[due, np.newaxis], scale[due, np.newaxis])
 
         first = arrived != now  # whether it is the first of the sensor's frames that arrived at `now`
-        for column, begun in ((before, jitter), (pause, now - arrived), (came, 0.0)):
+        for column, begun in ((before, jitter), (pause, waited), (came, 0.0)):
             np.copyto(column, begun, where=first)
         came += 1
         moved = before + (np.abs(pause - came * expected) - before) * JITTER_SHARE
@@ -409,12 +409,12 @@ def _twice(table: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([table, np.zeros_like(table)])
 
 
-def _shares(ago: Array) -> Array:
-    """(n,) shares of a difference by which a filter moves in (n,) times `-ago`, in units of its time constant.
+def _shares(seconds: Array, tau: float | Array) -> Array:
+    """(n,) shares of a difference by which a filter with time constant `tau` (s) moves in (n,) s.
 
     It is one share if all are alike, as for sensors that are read together again and again.
     """
-    times = ago.tolist()
+    times = (seconds / -tau).tolist()
     if times.count(times[0]) == len(times):
         times = times[:1]
-    return -np.fromiter(map(math.expm1, times), np.float64, len(times))
+    return np.array([-math.expm1(time) for time in times])
