@@ -68,11 +68,10 @@ class Activity:
     def measure_all(self, scaled: Array) -> tuple[Array, Array]:
         """What `measure` gives for each of n sensors, by their (n, N) deviations, which it sorts: (n,) and (n,)."""
         spots = np.matmul(np.matmul(self._down, scaled.reshape(-1, self.rows, self.columns)), self._across)
-        ordered = scaled
-        ordered.sort(axis=1)
-        common = np.minimum(np.maximum(ordered[:, ordered.shape[1] // 2], -COMMON), COMMON)
+        scaled.sort(axis=1)
+        common = np.minimum(np.maximum(scaled[:, scaled.shape[1] // 2], -COMMON), COMMON)
         strongest = spots.reshape(scaled.shape).max(axis=1) - common * BLOB_GAIN
-        return np.maximum(strongest, ordered[:, -1] - common), ordered[:, 0]
+        return np.maximum(strongest, scaled[:, -1] - common), scaled[:, 0]
 
     def place(self, pressed: Array, noise: float) -> tuple[float, float]:
         """The centroid (row, column), in taxel pitches, of (N,) counts that clearly rise above 0 and above `noise`."""

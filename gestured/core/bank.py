@@ -46,7 +46,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOBODY: Source = "", 0  # owns no sensor
-NO_ROW = np.array([-1])
 FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
@@ -117,10 +116,8 @@ class Banks:
         for one, other in combinations(blocks, 2):
             others = others.union(set(one.sensors).intersection(other.sensors))
         for block in blocks:
-            senders = [sources[n] for n in block.packets]
-            for n, name in enumerate(block.sensors if others else ()):
-                if name in others:
-                    senders[n] = NOBODY
+            named = zip(block.sensors, block.packets, strict=True)
+            senders = [NOBODY if name in others else sources[n] for name, n in named]
             lost = np.zeros(len(senders), np.intp) - 1
             for bank in self._banks.values():
                 try:
@@ -135,7 +132,7 @@ class Banks:
                     left[block.packets[n]] = block, n
                 else:
                     arrived.setdefault(before, []).append(name)
-        facts += [Arrived(tuple(each), 1, lost, 0, 0, 0) for lost, each in arrived.items()]
+        facts += [Arrived(tuple(each), 1, lost, 0, 0, 0) for lost, each in arrived.items() if each]
         return left
 
 
@@ -255,11 +252,11 @@ class Bank:
         """Take the idle frames of a block. `lost` (n,) gets how many were lost just before each that was taken."""
         if block.values.shape[1:] != self._front.grid_sent or (self._by_tag and block.tags is None):
             return
-        owners = zip(block.sensors, senders, strict=True)
-        rows = np.fromiter(map(self._rows.get, owners, repeat(-1)), np.intp, len(senders))
+        named = zip(block.sensors, senders, strict=True)
+        rows = np.fromiter(map(self._rows.get, named, repeat(-1)), np.intp, len(senders))
         mine = (rows >= 0).nonzero()[0]
         places = mine[rows[mine].argsort(kind="stable")]  # by row, and those of one row as they arrived
-        row = np.concatenate((NO_ROW, rows[places], NO_ROW))
+        row = np.concatenate(([-1], rows[places], [-1]))
         edges = (row[1:] != row[:-1]).nonzero()[0]
         begins, ends = edges[:-1], edges[1:]  # of the frames of each row
         if len(begins) < len(places):
@@ -410,10 +407,7 @@ def _twice(table: NDArray[Any]) -> NDArray[Any]:
 
 
 def _shares(seconds: Array, tau: float | Array) -> Array:
-    """(n,) shares of a difference by which a filter with time constant `tau` (s) moves in (n,) s.
-
-    It is one share if all are alike, as for sensors that are read together again and again.
-    """
+    """(n,) shares of a difference by which a filter of time constant `tau` moves in (n,) s; one if all are alike."""
     times = (seconds / -tau).tolist()
     if times.count(times[0]) == len(times):
         times = times[:1]

@@ -127,6 +127,9 @@ class _Meaning(NamedTuple):
     places: tuple[tuple[int, int], ...]  # the bytes at which each of them begins and ends in the packet
 
 
+_Group = tuple[list[int], tuple[_Meaning, ...]]  # packets of one form, by their indices among all, and what each means
+
+
 class Decoder:
     """Packets in, frames out. `grids` says the grid (R, C) of a sensor, as it is sent.
 
@@ -143,6 +146,9 @@ class Decoder:
         self._route = lru_cache(_MAX_ROUTES)(self._find_route)
         self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, since numbers compare faster
         self._numbers = count()
+        # The layouts and lengths of the packets that were read last, and their groups: often the next are alike.
+        self._seen: tuple[list[Layout | None], list[int]] = [], []
+        self._groups: list[_Group] = []
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 
     def decode(self, packet: bytes, source: Hashable = None) -> tuple[list[Arrival], list[ProtocolError]]:
@@ -177,23 +183,28 @@ class Decoder:
         A block holds what `decode` gives of each of its packets, in a fraction of the time. The caller has to give
         `decode` the packets that are in no block: few others are laid out as they are, or a value is not finite.
         """
-        meanings: dict[int, _Meaning] = {}  # by packet
-        alike: dict[int, list[int]] = {}  # packets by form
-        for i, layout in enumerate(self._layouts.guess(packets)):
-            if layout is not None and layout.length == len(packets[i]):
+        layouts, lengths = self._layouts.guess(packets), [len(packet) for packet in packets]
+        if (layouts, lengths) != self._seen:
+            self._seen, self._groups = (layouts, lengths), self._group(layouts, lengths)
+        found: dict[tuple[object, ...], list[Block]] = {}
+        for group in self._groups:
+            one = _block(packets, *group)
+            key = one.values.shape[1:], one.values.dtype, one.counters is None, one.tags is None
+            found.setdefault(key, []).append(one)
+        return [_joined(blocks) for blocks in found.values()]
+
+    def _group(self, layouts: list[Layout | None], lengths: list[int]) -> list[_Group]:
+        """The groups of packets that may have these layouts, and have these lengths."""
+        alike: dict[int, list[tuple[int, _Meaning]]] = {}
+        for i, layout in enumerate(layouts):
+            if layout is not None and layout.length == lengths[i]:
                 meaning: _Meaning | Literal[False] = layout.meaning
                 if meaning is None:
                     meaning = layout.meaning = self._meaning(layout)
                 if meaning:
-                    meanings[i] = meaning
-                    alike.setdefault(meaning.form, []).append(i)
-        found: dict[tuple[object, ...], list[Block]] = {}
-        for members in alike.values():
-            if len(members) >= FEW:
-                one = _block(packets, members, [meanings[i] for i in members])
-                key = one.values.shape[1:], one.values.dtype, one.counters is None, one.tags is None
-                found.setdefault(key, []).append(one)
-        return [_joined(blocks) for blocks in found.values()]
+                    alike.setdefault(meaning.form, []).append((i, meaning))
+        several = (zip(*members, strict=True) for members in alike.values() if len(members) >= FEW)
+        return [(list(found), meanings) for found, meanings in several]
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """The meaning of packets of a layout; False if each of them has to be read by itself."""
@@ -296,7 +307,7 @@ def _frame(message: Message, route: _Route) -> Arrival:
     return _new(Arrival, (route.sensor, values.reshape(rows, columns), counter, message.timetag, ()))
 
 
-def _block(packets: Sequence[bytes], found: list[int], meanings: list[_Meaning]) -> Block:
+def _block(packets: Sequence[bytes], found: list[int], meanings: tuple[_Meaning, ...]) -> Block:
     """The finite frames of packets that may be of one form; packets with other heads are left out."""
     route, slot, dtype, _, _, places = meanings[0]
     assert route.grid is not None
