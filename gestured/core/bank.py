@@ -49,14 +49,14 @@ NOBODY: Source = "", 0  # owns no sensor
 FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
-# The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for.
+# The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for. The
+# first three are kept of the last frames, too.
 NAMES = (
     "last", "new", "gap", "arrived", "tag", "counter", "interval", "jitter",
     "glance", "learned", "quieter", "lively", "reviewed", "step", "level",
     "usual", "scale", "active", "count",
     "expected", "before", "pause", "came",
 )  # fmt: skip
-WHEN = slice(3)  # the first three of them, which are kept of the last frames
 COLUMN = {name: n for n, name in enumerate(NAMES)}
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # tables by taxel: of `Idle`, `Conditioner`, and the last frame sent
 
@@ -116,8 +116,7 @@ class Banks:
         for one, other in combinations(blocks, 2):
             others = others.union(set(one.sensors).intersection(other.sensors))
         for block in blocks:
-            named = zip(block.sensors, block.packets, strict=True)
-            senders = [NOBODY if name in others else sources[n] for name, n in named]
+            senders = [NOBODY if block.sensors[i] in others else sources[n] for i, n in enumerate(block.packets)]
             lost = np.zeros(len(senders), np.intp) - 1
             for bank in self._banks.values():
                 try:
@@ -363,7 +362,7 @@ class Bank:
         count += 1
         rows, known = rows[keep], known[keep]
         self._above[rows, slot % self._above.shape[1]] = above[keep]
-        self._when[rows, slot % self._when.shape[1]] = known[:, WHEN]
+        self._when[rows, slot % self._when.shape[1]] = known[:, :3]
         self._taxels[COUNTS][rows], self._taxels[SENT][rows] = counts[keep], sent[keep]
         self._known[rows] = known
         return np.where(taken, lost, -1).astype(np.intp)

@@ -127,7 +127,8 @@ class _Meaning(NamedTuple):
     places: tuple[tuple[int, int], ...]  # the bytes at which each of them begins and ends in the packet
 
 
-_Group = tuple[list[int], tuple[_Meaning, ...]]  # packets of one form, by their indices among all, and what each means
+# Packets of one form: their indices among all, the meaning of the first, their sensors, and their heads, joined.
+_Group = tuple[list[int], _Meaning, list[str], bytes]
 
 
 class Decoder:
@@ -188,7 +189,7 @@ class Decoder:
             self._seen, self._groups = (layouts, lengths), self._group(layouts, lengths)
         found: dict[tuple[object, ...], list[Block]] = {}
         for group in self._groups:
-            one = _block(packets, *group)
+            one = _block(packets, group)
             key = one.values.shape[1:], one.values.dtype, one.counters is None, one.tags is None
             found.setdefault(key, []).append(one)
         return [_joined(blocks) for blocks in found.values()]
@@ -204,7 +205,10 @@ class Decoder:
                 if meaning:
                     alike.setdefault(meaning.form, []).append((i, meaning))
         several = (zip(*members, strict=True) for members in alike.values() if len(members) >= FEW)
-        return [(list(found), meanings) for found, meanings in several]
+        return [
+            (list(found), meanings[0], [m.route.sensor for m in meanings], b"".join([m.heads for m in meanings]))
+            for found, meanings in several
+        ]
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """The meaning of packets of a layout; False if each of them has to be read by itself."""
@@ -307,25 +311,23 @@ def _frame(message: Message, route: _Route) -> Arrival:
     return _new(Arrival, (route.sensor, values.reshape(rows, columns), counter, message.timetag, ()))
 
 
-def _block(packets: Sequence[bytes], found: list[int], meanings: tuple[_Meaning, ...]) -> Block:
+def _block(packets: Sequence[bytes], group: _Group) -> Block:
     """The finite frames of packets that may be of one form; packets with other heads are left out."""
-    route, slot, dtype, _, _, places = meanings[0]
+    found, (route, slot, dtype, _, _, places), sensors, expected = group
     assert route.grid is not None
     taxels, size = math.prod(route.grid), slot.length if slot.blob else slot.length * dtype.itemsize
     block = np.frombuffer(b"".join([packets[i] for i in found]), np.uint8).reshape(len(found), -1)
     raw = block[:, slot.run : slot.run + size].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
     finite = np.isfinite(values)
-    heads = np.hstack([block[:, begin:end] for begin, end in places])
+    heads = np.concatenate([block[:, begin:end] for begin, end in places], axis=1)
     counters = tags = None
     if route.counted:
         first = raw if slot.unpack is None else block[:, slot.scalars : slot.scalars + 4].view(">i4")
         counters = first[:, 0].astype(np.int64)
     if slot.start:  # outside of a bundle a message begins at 0
         tags = osc.timetags(block[:, 8:16])
-    sensors = [meaning.route.sensor for meaning in meanings]
     read = Block(found, sensors, values.reshape(-1, *route.grid), counters, tags)
-    expected = b"".join([meaning.heads for meaning in meanings])
     if heads.tobytes() == expected and 0 not in finite.tobytes():  # much faster than row by row
         return read
     same = heads == np.frombuffer(expected, np.uint8).reshape(heads.shape)
