@@ -259,8 +259,7 @@ class Bank:
         edges = (row[1:] != row[:-1]).nonzero()[0]
         begins, ends = edges[:-1], edges[1:]  # of the frames of each row
         if len(begins) < len(places):
-            # Several frames that arrive together share a time, unless each has a later time tag than the one before it.
-            # A sensor's own stamper spaces such frames.
+            # Frames of a sensor share their time of arrival unless their time tags rise; its stamper has to space them.
             tags = block.tags[places] if self._by_tag and block.tags is not None else np.zeros(len(places))
             later = np.concatenate(([True], tags[1:] > tags[:-1]))
             later[begins] = True
