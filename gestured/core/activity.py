@@ -91,7 +91,7 @@ class Activity:
 
     def learn(self, scaled: Array) -> None:
         """Learn the usual activity from (n, N) deviations of idle frames, in noise units with a `scale` of 1."""
-        self.usual = float(median(np.array([self.measure(frame)[0] for frame in scaled])))
+        self.usual = float(median(self.measure_all(scaled)[0]))
 
     def follow(self, t: float, since: float, activity: float) -> None:
         """Let the usual activity follow a sensor that was idle from `since` to `t` s, by its `activity` at `t`."""
