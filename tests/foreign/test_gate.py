@@ -76,6 +76,9 @@ class Damaged:
         self.asked += 1
         return replace(found, values=np.roll(found.values, 1)) if self.asked % 8 == 0 else found
 
+    def preview(self, segment: Segment) -> Scores | None:
+        return None
+
 
 @pytest.mark.parametrize("level", ["nominal", "hard"])
 def test_a_model_that_is_worse_does_not_pass(level: str) -> None:
