@@ -10,12 +10,18 @@ import socket
 import struct
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 DEADLINE_S = 60.0
+GONE = -32000  # the error of a question to a page that was left before its answer
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+class PageGone(AssertionError):
+    """The page was left, or loaded again, before it had answered."""
 
 
 class Browser:
@@ -63,6 +69,8 @@ class Browser:
         while True:
             message = json.loads(self._web.receive())
             if message.get("id") == self._number:
+                if message.get("error", {}).get("code") == GONE:
+                    raise PageGone(method, message)
                 assert "error" not in message, (method, message)
                 return message["result"]
             self.said.append(message)
@@ -76,10 +84,12 @@ class Browser:
     def until(self, script: str) -> Any:
         """The value of an expression once it is true."""
         end = time.monotonic() + DEADLINE_S
-        while not (found := self.run(script)):
-            assert time.monotonic() < end, f"never: {script}; the page says {self.run('document.body.innerText')}"
+        while time.monotonic() < end:
+            with suppress(PageGone):  # it is being loaded again
+                if found := self.run(script):
+                    return found
             time.sleep(0.01)  # for the page's own work
-        return found
+        raise AssertionError(f"never: {script}; the page says {self.run('document.body.innerText')}")
 
     def size(self, width: int, height: int) -> None:
         """The window's size in pixels."""
