@@ -1,6 +1,6 @@
 """Whether this checkout decides as an older one does: of the same frames, to the last bit the same events.
 
-    git worktree add /tmp/before 2daaac0e
+    git worktree add /tmp/before COMMIT
     python -m experiments.same /tmp/before --real ../shared/data
 
 Both checkouts play hours of simulated everyday contact, simulated gestures on sensors of every kind, and perhaps real
@@ -44,12 +44,12 @@ from gestured.simulator.places import PLACES
 from gestured.simulator.variety import any_sensor
 
 HELD = Path(__file__).with_name("same.txt")
-SEED = 77  # of people from whom nothing has learned
-DAY_S = 720.0
-OF_A_PART = 50  # takes
-FASTEST_HZ = 30.0  # of a day's sensor; faster ones would take most of the time
-SILENCE_S = 5.0  # after the last frame
-FIELD = r", {}=(?:'[^']*'|[^,()]*)"  # of an event, as `repr` has it
+SEED = 77  # of simulated people from whom no model has learned
+DAY_S = 720.0  # length of a simulated day
+OF_A_PART = 50  # takes that are written into one file
+FASTEST_HZ = 30.0  # the highest rate of a sensor in a day; days of faster sensors would take most of the time
+SILENCE_S = 5.0  # from the last frame of a stream to its end, so that an open contact is answered
+FIELD = r", {}=(?:'[^']*'|[^,()]*)"  # the pattern of one field in the `repr` of an event
 
 
 class Stream(NamedTuple):
@@ -60,7 +60,7 @@ class Stream(NamedTuple):
 
 
 def streams(days: int, takes: int, real: Path | None) -> Iterator[list[Stream]]:
-    """What both checkouts play, in parts; half of the days are those of a nominal sensor, the others of any."""
+    """The streams that both checkouts play, in parts. Every second day has a sensor drawn at random."""
     places = [*PLACES.values(), *CHANCE.values()]
     for n in range(days):
         rng = generator(SEED, 0xDA, n)
@@ -77,7 +77,7 @@ def streams(days: int, takes: int, real: Path | None) -> Iterator[list[Stream]]:
 
 
 def write(parts: Iterator[list[Stream]], folder: Path) -> int:
-    """Write parts into a folder, one file each; says how many."""
+    """Write each part into a file of its own in a folder; returns the number of parts."""
     n = 0
     for n, part in enumerate(parts, 1):
         arrays = {f"{name}{k}": each for k, one in enumerate(part) for name, each in one._asdict().items()}
@@ -86,7 +86,7 @@ def write(parts: Iterator[list[Stream]], folder: Path) -> int:
 
 
 def told(folder: Path, model: str) -> Iterator[str]:
-    """The digest of the code that runs, and its events of the parts in a folder, in the order of their names."""
+    """The digest of the code that runs, then the events that it gives for the files of a folder, by name."""
     yield decides()
     opened = open_model(model)
     for path in sorted(folder.iterdir()):
@@ -102,7 +102,7 @@ def told(folder: Path, model: str) -> Iterator[str]:
 
 
 def told_by(checkout: Path, *words: str) -> Iterator[str]:
-    """What `told` gives with the package of a checkout, in a process of its own that begins at once."""
+    """What `told` gives by the code of a checkout, in a process that is started at once."""
     command = [sys.executable, __file__, "--tell", *words]
     environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
@@ -117,7 +117,10 @@ def told_by(checkout: Path, *words: str) -> Iterator[str]:
 
 
 def compared(here: Iterator[str], there: Iterator[str], but: str) -> int:
-    """How many events are told in both. The field that `but` names is passed over. Raises GesturedError otherwise."""
+    """The number of events, if both sides give the same. Raises GesturedError for the first that differs.
+
+    The field that `but` names, such as `Unknown.reason`, is not compared.
+    """
     kind, _, field = but.partition(".")
     passed = re.compile(FIELD.format(re.escape(field)))
 
@@ -132,7 +135,7 @@ def compared(here: Iterator[str], there: Iterator[str], but: str) -> int:
 
 
 def alike(older: str, newer: str, lines: str) -> bool:
-    """Whether lines of same.txt say, perhaps one after the other, that two digests of code decide alike."""
+    """Whether the codes of two digests decide alike, by one line of same.txt or by several, one after the other."""
     pairs = [line.split()[:2] for line in lines.splitlines() if not line.startswith("#")]
     known = {newer}
     while more := {before for now, before in pairs if now in known} - known:
@@ -147,7 +150,9 @@ def main() -> None:
     parser.add_argument("--days", type=int, default=60, help="of twelve minutes (%(default)s)")
     parser.add_argument("--takes", type=int, default=1500, help="single performances on any sensor (%(default)s)")
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="of real recordings, as docs/training.md has it")
-    parser.add_argument("--but", default="", metavar="EVENT.FIELD", help="what may differ")
+    parser.add_argument(
+        "--but", default="", metavar="EVENT.FIELD", help="a field that may differ, such as Unknown.reason"
+    )
     parser.add_argument("--tell", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.tell:

@@ -81,7 +81,7 @@ class Subscriber:
         return self
 
     def __next__(self) -> dict[str, Any]:
-        end = self._end()  # also across hellos, since a daemon that starts again and again says no event
+        end = self._end()  # it holds across hellos, since a daemon that restarts again and again sends no event
         while (line := self._next_line(end)) is not None:
             if line[1].get("type") != "hello":
                 return line[1]

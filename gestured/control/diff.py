@@ -12,7 +12,8 @@ from gestured.control.show import clock
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets are at most so far apart are about the same contact
-# Stand for answers that are not compared: the recording ends before one, and the replay did not know the sensor yet.
+# These stand for answers that are not compared, since the recording ends before them, or since the replay had not yet
+# learned the sensor.
 OPEN, EARLY = "none so far", "before the sensor was known"
 CONFIDENCE_TOLERANCE = 0.05  # a baseline that was learned at another moment may change a confidence by so much
 

@@ -39,7 +39,7 @@ class Seen:
 
     @property
     def contested(self) -> bool:
-        """Whether the daemon takes one sender alone; one that opens a new port for each message is one (`Owner`)."""
+        """Whether several programs send as this sensor. One may open a new port for each message (see `Owner`)."""
         hosts = {source.rpartition(":")[0] for source in self.sources}
         return len(hosts) > 1 or len(self.sources) > 1 < max(self.sources.values())
 

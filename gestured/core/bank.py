@@ -49,8 +49,8 @@ NOBODY: Source = "", 0  # owns no sensor
 FEW = 6  # from so many frames on, taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # the fewest frames whose times are kept; like a depth, a power of two
-# The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for. The
-# first three are kept of the last frames, too.
+# The numbers that are known of each sensor, by name; `Bank.enter` shows which attribute each of them stands for. Of the
+# first three, the values at the last few frames are kept as well.
 NAMES = (
     "last", "new", "gap", "arrived", "tag", "counter", "interval", "jitter",
     "glance", "learned", "quieter", "lively", "reviewed", "step", "level",
@@ -141,7 +141,9 @@ class Bank:
     def __init__(self, front: FrontEnd, by_tag: int, depth: int) -> None:
         """A bank for sensors with front ends like this one, which keeps the last `depth` frames of each."""
         self._by_tag, self._least_s = by_tag, max(LEAD_S / depth, Stamper.MIN_STEP_S)  # least interval between frames
-        self._most_s = min(front.timing.stale_s, 0.99 * Stamper.MAX_STEP_S)  # most; rounding must not pass the limit
+        self._most_s = min(
+            front.timing.stale_s, 0.99 * Stamper.MAX_STEP_S
+        )  # the most; less than the stamper allows, in case of rounding
         self._front, self._activity = front, Activity(front.rows, front.columns)  # for what all sensors share
         taxels = front.rows * front.columns
         self._sensors: dict[str, Sensor] = {}
@@ -300,7 +302,7 @@ class Bank:
             gap[:], lost = since, np.zeros(len(rows))
             if doubts is not None:  # as many frames as fit into the pause count as lost, see `Stamper.stamp`
                 lost[doubts] = np.maximum(np.rint(since / self._usual(rows, count))[doubts] - 1, 0)
-        else:  # see `Stamper._count`; where a counter wraps, no frame is taken
+        else:  # see `Stamper._count`; a frame whose counter wraps is left to its sensor
             steps = block.counters.take(places) - counter
             taken &= (steps >= 1) & (steps <= Stamper.LEAP)
             counter += steps

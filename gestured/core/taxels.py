@@ -107,7 +107,7 @@ class Flickering:
         self._turns *= self._frames - self._turned < TURN_FRAMES
         self._turns += turned
         self._turned[turned] = self._frames
-        if not self.any and self._turns.item(self._turns.argmax()) < TURNS:  # and most of the others here
+        if not self.any and self._turns.item(self._turns.argmax()) < TURNS:  # most of the other frames end here
             return False
         mask = self.mask & (self._frames - self._turned < STEADY_FRAMES)
         often = self._turns >= (TURNS_TOO if self.any else TURNS)

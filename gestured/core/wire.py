@@ -147,7 +147,7 @@ class Decoder:
         self._route = lru_cache(_MAX_ROUTES)(self._find_route)
         self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, since numbers compare faster
         self._numbers = count()
-        # The layouts and lengths of the packets that were read last, and their groups: often the next are alike.
+        # The layouts, lengths and groups of the packets of the last read, since the next read is often laid out alike.
         self._seen: tuple[list[Layout | None], list[int]] = [], []
         self._groups: list[_Group] = []
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame

@@ -72,7 +72,7 @@ def _remove(file: Path, participant: str) -> None:
 
 
 def _files(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
-    """The files and those in the folders, also what `write` leaves in a power failure; why a folder cannot be read.
+    """The files, with those in folders and what `write` leaves in a power failure; and the folders that cannot be read.
 
     Links are followed, since a link does not hold the recordings.
     """
