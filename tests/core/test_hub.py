@@ -87,15 +87,6 @@ def crossed() -> list[Arrived]:
     return owner + [(t + 0.01, floats("/arm/pressure", hand.frame() + 90, 0), SECOND) for t, _, _ in owner[5:40]]
 
 
-def test_a_second_source_feeds_nothing(crossed: list[Arrived]) -> None:
-    facts = play(SCENE, crossed)
-    assert sum(isinstance(fact, Dropped) and fact.reason == "second_source" for fact in facts) == 35
-    taken = [fact.frame for fact in facts if isinstance(fact, Taken)]
-    assert len(taken) == len(crossed) - 35 and max(float(frame.values.max()) for frame in taken) < 205
-    alone = [fact for fact in play(SCENE, [one for one in crossed if one[2] == FIRST]) if isinstance(fact, Event)]
-    assert [fact for fact in facts if isinstance(fact, Event)] == alone != []
-
-
 def test_packets_that_are_found_together_decide_what_they_decide_one_by_one() -> None:
     """Sensors that are swiped over at other moments, beside junk, NaN and a second source."""
     rng, hubs = np.random.default_rng(25), [Hub(replace(SCENE, frames=False), Sure()) for _ in range(2)]

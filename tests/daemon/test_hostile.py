@@ -39,15 +39,6 @@ def test_rubbish_is_counted_and_nobody_else_notices(shared: Daemon, name: str) -
     assert shared.metric("gestured_dropped_total", reason=reason) == before + 8
 
 
-def test_a_bundle_from_the_future_stops_nothing(start) -> None:
-    daemon = start("--metrics", "127.0.0.1:0")
-    client = daemon.client().subscribe("status")
-    sensor = Sensor(daemon, "prophet")
-    sensor.t = 9e9
-    sensor.begin()
-    assert client.until(lambda line: "prophet" in line["sensors"])
-
-
 def test_what_is_dropped_is_logged_at_a_bounded_rate(start) -> None:
     daemon = start("--metrics", "127.0.0.1:0")
     sensor = Sensor(daemon, "noisy")

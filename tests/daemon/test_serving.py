@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from pythonosc.osc_message import OscMessage
 
-from tests import encoding
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Sensor
 
@@ -35,30 +34,6 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
     assert 0.1 <= event["decided"] - event["offset"] < 0.3
     # The sensor's clock begins at the arrival of its first frame, whatever its time tags say.
     assert before + 1.5 < event["onset"] < time.time() + 10
-
-
-def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
-    client = shared.client()
-    sensor = Sensor(shared, "packed", harness.counted).begin()
-    for part in (sensor.hand.swipe("down"), sensor.hand.idle(1.0)):
-        packets = [sensor.packet(frame) for frame in part]
-        if len(part) == 7:
-            del packets[3]  # lost on the way
-        sensor.sock.send(encoding.bundle(packets))
-    (event,) = client.events("gesture", "packed")
-    assert (event["gesture"], event["lost"], event["frames"]) == ("swipe_down", 1, 6)
-    assert shared.metric("gestured_frames_total", sensor="packed", result="lost") in (0.0, 1.0)
-
-
-def test_a_bad_request_is_answered_and_the_connection_goes_on(shared: Daemon) -> None:
-    """What else may be wrong with one, tests/core/test_subscription.py says."""
-    client = shared.client()
-    for line, said in ((b"hello\n", "JSON"), (b"x" * 10_000 + b"\n", "4096")):
-        client.ask(line)
-        answer = client.line()
-        assert answer["type"] == "error" and said in answer["reason"]
-    Sensor(shared, "after_error").begin().perform("left")
-    assert client.events("gesture", "after_error")
 
 
 def test_status_comes_by_itself_and_names_each_sensor(shared: Daemon) -> None:

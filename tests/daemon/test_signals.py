@@ -160,20 +160,3 @@ def test_a_stop_while_it_imports_its_settings_is_no_failure(number: int) -> None
         starting.send_signal(number)
         assert "Traceback" not in starting.stderr.read()
     assert starting.returncode == 0
-
-
-def test_a_stall_of_the_daemon_is_not_taken_for_silence_of_the_sensor(start, shared: Daemon) -> None:
-    daemon = start("--clock", "sensor", "--stale-s", "0.2")
-    client = daemon.client().subscribe("gesture", "unknown", "cancelled", "onset")
-    elsewhere = shared.client().subscribe("status")
-    sensor = Sensor(daemon, "arm").begin()
-    frames = sensor.hand.swipe("left") + sensor.hand.idle(1.0)
-    sensor.send(frames[:3])
-    assert client.line()["type"] == "onset"
-    daemon.signal(signal.SIGSTOP)
-    sensor.send(frames[3:])
-    for _ in range(2):
-        elsewhere.line()  # at least a second
-    daemon.signal(signal.SIGCONT)
-    answer = client.line()
-    assert (answer["type"], answer.get("gesture"), answer.get("frames")) == ("gesture", "swipe_left", 7)
