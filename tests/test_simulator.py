@@ -86,15 +86,6 @@ def test_the_cohort_is_the_full_factorial_in_order() -> None:
     assert len({t.participant for t in plan}) == 34
 
 
-def test_any_part_of_the_cohort_can_be_made_alone() -> None:
-    plan = list(cohort_plan(1))
-    takes = [cohort_take(trial, 7) for trial in plan[:18]]
-    for trial, take in ((plan[17], takes[17]), (plan[0], takes[0])):  # in another order, without those between
-        assert cohort_take(trial, 7).frames.tobytes() == take.frames.tobytes()
-        event = take.events[0]
-        assert (event.label, event.speed, event.inclination) == (trial.gesture, trial.speed, trial.inclination)
-
-
 def test_the_ten_are_the_contract_s_and_none_is_among_the_others() -> None:
     """A net would be taught it as none of the gestures."""
     assert GESTURES == (

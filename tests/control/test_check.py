@@ -18,12 +18,6 @@ def test_what_cannot_be_used_is_one_sentence_and_status_3(run, tmp_path, content
     assert str(path) in err
 
 
-def test_a_name_that_does_not_ship(run):
-    status, _, err = run("check", "cnn_lstn")
-    assert status == 3
-    assert "cnn_lstn" in err and "cnn_lstm" in err
-
-
 @pytest.mark.parametrize("name", sorted(shipped()))
 def test_shipped_models_can_be_used(run, name):
     if not shipped()[name].exists():

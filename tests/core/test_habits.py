@@ -26,15 +26,6 @@ def seen(sensor: Sensor) -> tuple[bool, bool]:
     return sensor.condition(0.0)[0] == "inverted", reading.exchanged
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_counts_that_fall_under_a_finger_are_noticed_and_inverting_them_helps(seed: int) -> None:
-    falling = played(swipes(9, 9, -1.0, seed=seed))
-    assert seen(falling)[0] and falling.segments == 0
-    assert not seen(played(swipes(9, 9, 1.0, seed=seed)))[0]
-    mended = played(swipes(9, 9, -1.0, seed=seed), mounting=Mounting(invert=True))
-    assert mended.segments == 4 and not seen(mended)[0]
-
-
 def test_inverted_counts_are_read_as_if_they_rose() -> None:
     for dtype in (np.uint8, np.float32, np.int64):
         sent = np.array([[0, 200], [7, 30]], dtype)
@@ -73,15 +64,6 @@ def stretch(vitals: Vitals, begin: float, seconds: float, *, missed: bool = Fals
         vitals.arrived(begin + n / RATE_HZ, 1, missed=missed and n == 0)
     vitals.silent()
     return begin + seconds + 3.0
-
-
-def test_stretches_of_frames_with_silences_between_are_noticed() -> None:
-    vitals, now = Vitals(), 0.0
-    for n in range(4):
-        assert vitals.intermittent == (n >= 3)
-        now = stretch(vitals, now, 0.6)
-    stretch(vitals, now, 10.0)
-    assert not vitals.intermittent  # it has sent while nobody touched it
 
 
 def test_a_silence_in_which_this_machine_had_no_room_is_not_the_sensors() -> None:

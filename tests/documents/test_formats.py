@@ -12,8 +12,6 @@ from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gate, Gesture, Place, Provisional, Touch, Unknown, Where
 from gestured.core.messages import parse_subscription
 from gestured.daemon.explain import explain
-from gestured.model.shipped import shipped
-from tests.daemon.harness import Sensor
 from tests.daemon.parts import settings_of
 from tests.documents.blocks import ROOT, Block, blocks
 
@@ -78,21 +76,6 @@ def test_lines_of_every_kind_are_valid(valid: Any):
     )
     valid(json.loads(messages.lost_json(3)))
     valid(json.loads(messages.error_json("no")))
-
-
-@pytest.mark.e2e
-def test_a_daemons_lines_are_valid(valid: Any, serve):
-    if not shipped()["cnn_lstm"].exists():
-        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    daemon = serve("--clock", "sensor", "--touch", "true", model="cnn_lstm")
-    client = daemon.client().subscribe(*TYPES).ask(b"rubbish\n")
-    Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
-    lines = [client.hello]
-    while not {line["type"] for line in lines} >= {"error", "onset", "release", "status"}:
-        lines.append(client.line())
-    client.close()
-    for line in lines:
-        valid(line)
 
 
 @pytest.mark.parametrize("block", blocks("checked", "the schema"), ids=str)

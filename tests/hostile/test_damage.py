@@ -40,14 +40,6 @@ def test_nobody_makes_no_gesture(bench: damage.Bench, nobody: Take, name: str) -
     assert violations(lines) == []
 
 
-@pytest.mark.parametrize("name", FAULTS)
-def test_every_onset_of_somebody_ends(bench: damage.Bench, somebody: Take, name: str) -> None:
-    damaged = damage.damage(FAULTS[name], somebody, 1)
-    lines = bench.events(damaged.arrivals, damaged.stalls)
-    assert any(line["type"] == "onset" for line in lines)
-    assert violations(lines) == []
-
-
 def gestures(lines: list[dict[str, Any]], after: float) -> list[tuple[str, float]]:
     return [(line["gesture"], line["onset"]) for line in lines if line["type"] == "gesture" and line["onset"] > after]
 

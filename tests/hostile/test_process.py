@@ -9,7 +9,7 @@ import pytest
 
 from gestured.core.errors import ModelError
 from gestured.model.opening import open_model
-from tests.daemon.harness import Daemon, Hand, Sensor, counted, lines_of
+from tests.daemon.harness import Daemon, Hand, Sensor, lines_of
 from tests.hostile import bad_models
 from tests.hostile.grammar import TYPES, violations
 
@@ -102,20 +102,6 @@ def test_the_sensors_clock_may_step_by_an_hour(start) -> None:
     assert daemon.metric("gestured_implausible_time_tags_total") == 2
 
 
-def test_a_sensor_that_restarts_in_mid_gesture_is_learned_anew(start) -> None:
-    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
-    client = daemon.client().subscribe(*TYPES)
-    sensor = Sensor(daemon, "arm", counted).begin().perform("left")
-    sensor.send(sensor.hand.swipe("right")[:4])
-    sensor.count = -1  # its counter begins at 0 again
-    sensor.begin().perform("right")
-    lines = [client.line() for _ in range(9)]
-    assert violations(lines) == []
-    answers = [line.get("gesture", line.get("reason")) for line in lines if line["type"] not in ("onset", "release")]
-    assert answers == ["swipe_left", "restart", "swipe_right"]
-    assert daemon.metric("gestured_cancelled_total", reason="restart") == 1
-
-
 def test_a_model_that_fails_hands_over_to_the_next(start, model: Path, tmp_path: Path) -> None:
     bad = bad_models.failing(model, tmp_path / "bad.onnx")
     daemon = start("--fallback", model, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)
@@ -158,15 +144,6 @@ def test_a_model_that_hangs_is_ended_and_hands_over_to_the_next(start, model: Pa
     assert answers == [("tiny", True), ("tiny", True)]
     assert daemon.get("/healthz")[0] == 200 and daemon.metric("gestured_model_failures_total") == 1
     assert "did not answer" in daemon.stderr()
-
-
-@pytest.mark.hostile
-def test_a_model_whose_opening_never_ends_is_no_model_to_start_with(model: Path, tmp_path: Path) -> None:
-    bad = bad_models.endless(model, tmp_path / "bad.onnx")
-    daemon = Daemon(tmp_path, "--model", bad, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")
-    assert daemon.wait() == 3
-    assert "bad.onnx: could not be opened within" in daemon.stderr().splitlines()[-1]
-    daemon.stop()
 
 
 def test_the_end_does_not_wait_for_a_model_at_the_start(model: Path, tmp_path: Path) -> None:
