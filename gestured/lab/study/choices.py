@@ -21,7 +21,7 @@ from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import SHIFT, THRESHOLD, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Result, Task
+from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
 from gestured.lab.study.tables import Plan, right, task
 from gestured.lab.study.views import POOLED, TAXELS, Values
 
@@ -127,35 +127,17 @@ def choices(
 TUNING = "tuning"  # the name of the data
 
 
-def tune(plan: Plan, people: Data | None, schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
-    """The best hyperparameters of each method on `people`, and all candidates' figures; without people the first."""
+def tune(plan: Plan, people: Data | None, schedule: Schedule) -> dict[str, Values]:
+    """The best hyperparameters of each method on `people`; without people the first."""
     if people is None:
-        return {method.id: method.grid[0] for method in METHODS.values()}, []
-    asked: dict[tuple[str, int], tuple[Values, Task]] = {}
+        return {method.id: method.grid[0] for method in METHODS.values()}
+    asked: dict[tuple[str, int], Task] = {}
     for method in METHODS.values():
-        for values in method.grid:
+        for k, values in enumerate(method.grid):
             shorter = {**values, "steps": plan.tuning_steps} if method.network else values
-            asked[method.id, len(asked)] = (
-                values,
-                replace(task(method, shorter, UNCHANGED, PARTICIPANTS, TUNING, plan), folds=plan.tuning_folds),
-            )
-    found = schedule.results([item[1] for item in asked.values()], {TUNING: people}, "hyperparameters")
-    chosen: dict[str, Values] = {}
-    rows = []
-    for method in METHODS.values():
-        candidates: list[dict[str, Any]] = [
-            {"values": dict(values), **_figures(found[of])}
-            for (name, _), (values, of) in asked.items()
-            if name == method.id
-        ]
-        best = max(candidates, key=lambda c: float(c["right"]))
-        chosen[method.id] = best["values"]
-        rows.append({"method": method.id, "candidates": candidates, "chosen": best["values"]})
-    return chosen, rows
-
-
-def _figures(result: Result) -> dict[str, float]:
-    """Share right, and its standard deviation between folds."""
-    good, fold = right(result), np.array(result["fold"])
-    shares = [good[fold == k].mean() for k in np.unique(fold)]
-    return {"right": round(float(good.mean()), 4), "spread": round(float(np.std(shares)), 4)}
+            one = task(method, shorter, UNCHANGED, PARTICIPANTS, TUNING, plan)
+            asked[method.id, k] = replace(one, folds=plan.tuning_folds)
+    found = schedule.results(list(asked.values()), {TUNING: people}, "hyperparameters")
+    shares = {key: right(found[of]).mean() for key, of in asked.items()}
+    best = {method: max((key for key in asked if key[0] == method), key=shares.__getitem__) for method in METHODS}
+    return {method: METHODS[method].grid[k] for method, k in best.values()}

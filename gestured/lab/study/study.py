@@ -74,7 +74,7 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
         sets["real"] = Data.of("real", real[0])
     if foreign:
         sets["foreign"] = Data.of("foreign", people.samples, foreign[0])
-    tuned, tuning = tune(plan, _others(plan, schedule), schedule)
+    tuned = tune(plan, _others(plan, schedule), schedule)
     cells = tables.wanted(plan, sets)
     tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
     results = schedule.results([task for some in tasks.values() for task in some], sets, "cells")
@@ -99,7 +99,6 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
         "cells": list(figures.values()),
         "trials": tables.by_trial(found, people.trials()),
         "copies": tables.copies(found),
-        "tuning": tuning,
         "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),
     }  # fmt: skip
     # Timing comes last and alone: nothing else of this program runs beside it.

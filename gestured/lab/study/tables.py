@@ -106,8 +106,6 @@ def pooled(results: Sequence[Result]) -> Result:
     lists = {key for key, value in results[0].items() if isinstance(value, list)}
     return {
         **{key: [item for result in results for item in result[key]] for key in lists},
-        "train": results[0]["train"],
-        "seconds": round(sum(result["seconds"] for result in results) / len(results), 3),
         "shares": [round(float(right(result).mean()), 4) for result in results],
     }
 
@@ -137,7 +135,7 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
         "n": len(result["truth"]) // len(result["shares"]), **summary(right(result), result["person"]),
         "seeds": len(result["shares"]), "spread": round(_spread(result["shares"]), 4),
         "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
-        "train": result["train"], "seconds": result["seconds"], "confusion": confusion.tolist(),
+        "confusion": confusion.tolist(),
     }  # fmt: skip
 
 

@@ -92,7 +92,7 @@ def test_all_else_is_told(report: Path, study: Study) -> None:
 
 def test_what_was_not_computed_is_a_dash_or_no_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gestured.lab.study.picture.confusion", lambda study: Figure())
-    study = made_study() | {"online": [], "online_shipped": [], "choices": [], "tuning": [], "run_time": []}
+    study = made_study() | {"online": [], "online_shipped": [], "choices": [], "run_time": []}
     study["data"] |= {"real": None, "foreign": None}
     study["about"]["quick"] = True
     study["cells"] = [cell for cell in study["cells"] if cell["protocol"] != "real"]

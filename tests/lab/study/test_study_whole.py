@@ -25,7 +25,6 @@ SECTIONS = (
     "cells",
     "trials",
     "copies",
-    "tuning",
     "choices",
     "run_time",
     "online",
