@@ -20,11 +20,6 @@ from tests.programs import PARSERS, subcommands
 DOCUMENTS = "".join(path.read_text() for path in documents())
 
 
-def readme(language: str) -> list[str]:
-    """The README's examples in a language."""
-    return [block.text for block in blocks(document="README.md") if block.language == language]
-
-
 def flags(parser: argparse.ArgumentParser) -> set[str]:
     found = {option for action in parser._actions for option in action.option_strings if option.startswith("--")}
     return found - {"--help"}
@@ -71,42 +66,6 @@ def test_no_row_describes_a_subcommand_that_is_gone():
     assert sorted(rows) == sorted(EACH)
 
 
-def test_the_subscriber_in_the_readme_prints_gestures(tmp_path: Path):
-    import socket
-
-    (code,) = [text for text in readme("python") if "subscribe" in text]
-    path = tmp_path / "events.sock"
-    gesture = {"type": "gesture", "sensor": "armrest", "gesture": "swipe_left", "confidence": 0.9}
-    with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(str(path))
-        listener.listen()
-        listener.settimeout(30)
-        command, environment = [sys.executable, "-c", code], os.environ | {"GESTURED_SOCKET": str(path)}
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as subscriber:
-            client, _ = listener.accept()
-            request = json.loads(client.makefile().readline())
-            assert request == {"subscribe": {"types": ["gesture"]}}
-            client.sendall(b'{"type":"hello"}\n' + json.dumps(gesture).encode() + b"\n")
-            client.close()
-            out, _ = subscriber.communicate(timeout=30)
-    assert out == "armrest swipe_left 0.9\n"
-
-
-def test_the_sensor_in_the_readme_sends_a_frame():
-    import socket
-
-    from pythonosc.osc_message import OscMessage
-
-    (code,) = [text for text in readme("python") if "pythonosc" in text]
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(30)
-        code = code.replace("9000", str(receiver.getsockname()[1]))
-        subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
-        message = OscMessage(receiver.recv(65536))
-    assert (message.address, len(message.params)) == ("/armrest/pressure", 81)
-
-
 @pytest.mark.e2e
 def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
     """The daemon, the simulated sensor and the listener as the README starts them, but for the addresses.
@@ -115,7 +74,7 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
     """
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    typed = "".join(readme("sh"))
+    typed = "".join(block.text for block in blocks(document="README.md") if block.language == "sh")
     daemon_line, simulate_line, listen_line, *_ = [x for x in typed.splitlines() if x.startswith("gesture")]
     (exported,) = re.findall(r"^export (\w+)=(?:\S+)$", typed, re.MULTILINE)
     environment = os.environ | {exported: str(tmp_path / "events.sock")}

@@ -1,6 +1,7 @@
 """The examples marked `run: here`: run against a real daemon, but for the addresses."""
 
 import os
+import re
 import select
 import signal
 import socket
@@ -17,6 +18,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 
 from gestured.client.control import Control
+from gestured.core.messages import parse_subscription
 from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.deploy.compilers import CPP, POSIX, C, compiled
@@ -35,6 +37,8 @@ PHRASES = {
     "BlockingOSCUDPServer",
     "OscBundleBuilder",
     "measure()",
+    "for row in matrix",
+    "makefile()",
     "gestured_packet",
     "np.load",
     "zones=zones",
@@ -106,7 +110,8 @@ class Place:
     @contextmanager
     def running(self, *command: str) -> "Iterator[subprocess.Popen[str]]":
         """A program that never ends, until it is no longer needed."""
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder) as process:
+        environment = os.environ | {"GESTURED_SOCKET": str(self.daemon.socket)}
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder, env=environment) as process:
             try:
                 yield process
             finally:
@@ -155,13 +160,17 @@ def test_a_loop_in_a_shell_goes_on(place: Place):
     ("phrase", "says"),
     [
         ("across its restarts", "armrest swipe_left 1.00 0 missed\n"),
+        ("makefile()", "armrest swipe_left 1.0\n"),
         ("BlockingOSCUDPServer", "armrest swipe_left 1.00 "),
         ('sensors=["armrest"]) as events', "swipe_left from armrest\n"),
     ],
 )
 def test_python_subscriber(place: Place, phrase: str, says: str):
+    code = example(phrase).text
+    for request in re.findall(r"b'({\"subscribe\".*})", code):  # one that is refused leaves a client with all events
+        parse_subscription(request.encode(), {"gestures": (), "zones": ()})
     with place.gestures():
-        line = place.first_line(sys.executable, "-c", place.here(example(phrase).text))
+        line = place.first_line(sys.executable, "-c", place.here(code))
     assert line.startswith(says)
 
 
@@ -251,13 +260,15 @@ def test_osc_messages():
     assert done.stdout.strip() == text.rstrip().rpartition("# bytes: ")[2]
 
 
-def test_python_sensor(place: Place):
+@pytest.mark.parametrize(("phrase", "name", "count"), [("measure()", "armrest", 30), ("for row in matrix", "seat", 1)])
+def test_python_sensor(place: Place, phrase: str, name: str, count: int):
+    """A name belongs to the first program that sends it, so each has one of its own."""
     before = place.daemon.frames()
-    code = place.here(example("measure()").text)
+    code = place.here(example(phrase).text.replace("/armrest/", f"/{name}/"))
     subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
-    while place.daemon.frames() < before + 30:
+    while place.daemon.frames() < before + count:
         pass
-    assert "armrest" in place.daemon.get("/readyz")[1]
+    assert name in place.daemon.get("/readyz")[1]
 
 
 @COMPILERS
