@@ -147,11 +147,6 @@ def test_each_subcommand_shows_an_example_that_is_valid(command: str):
         PARSERS["gesturectl"].parse_args(arguments)
 
 
-def test_what_prints_a_table_prints_json_too():
-    for name, parser in subcommands("gesturectl").items():
-        assert "--json" in parser.format_help(), name
-
-
 BESIDE = """
 import gestured, gestured.model.shipped
 from gestured.core import sensor
@@ -167,8 +162,9 @@ def test_a_script_beside_a_clone_finds_what_is_installed(environment: Environmen
     for arguments in ([script], ["-c", BESIDE]):
         done = environment.run(*arguments)
         assert done.stdout == f"{environment.package / '__init__.py'} open\nTrue\n", done.stderr
-    done = environment.run("-m", "gestured.control", "--version")
-    assert done.stdout == f"gesturectl {gestured.__version__}\n"
+    for module, program in (("control", "gesturectl"), ("daemon", "gestured")):
+        done = environment.run("-m", f"gestured.{module}", "--version")
+        assert done.stdout == f"{program} {gestured.__version__}\n"
 
 
 USE = """

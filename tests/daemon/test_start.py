@@ -13,7 +13,6 @@ import pytest
 
 from gestured.core.errors import SettingsError
 from gestured.daemon.bound import bind_all
-from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
 from gestured.daemon.sockets import AddressError, UnixListener
 from tests.daemon.harness import DEADLINE_S, Client, Daemon, Sensor, lines_of
@@ -328,13 +327,6 @@ def test_a_limit_of_open_files_that_is_too_low(model: Path, tmp_path: Path) -> N
     done = subprocess.run(limited, capture_output=True, text=True, timeout=DEADLINE_S)
     assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
     assert "found 20" in done.stderr and "expected at least 64" in done.stderr
-
-
-def test_flags_nobody_knows_and_help(capsys: pytest.CaptureFixture[str]) -> None:
-    for flag, status, said in (("--bogus", 2, "--bogus"), ("--help", 0, "--stale-s"), ("--version", 0, "gestured ")):
-        with pytest.raises(SystemExit) as ended:
-            parser().parse_args([flag])
-        assert ended.value.code == status and said in "".join(capsys.readouterr())
 
 
 def test_a_model_that_cannot_be_used(tmp_path: Path) -> None:

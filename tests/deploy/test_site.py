@@ -68,8 +68,3 @@ def test_every_link_and_anchor_of_the_site_resolves(pages: dict[Path, Page]):
 
 def test_the_site_loads_nothing_from_elsewhere(pages: dict[Path, Page]):
     assert [load for page in pages.values() for load in page.loads if urlsplit(load).scheme not in ("", "data")] == []
-
-
-def test_its_first_page_shows_a_gesture_and_what_each_model_costs(pages: dict[Path, Page]):
-    (first,) = [page for path, page in pages.items() if path.name == "index.html"]
-    assert {"docs/demo.svg", "docs/everyday.svg", "docs/operating-points.svg"} <= set(first.loads)
