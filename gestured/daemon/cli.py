@@ -3,7 +3,6 @@
 import argparse
 import os
 import signal
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -73,9 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OSError:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     # Until the daemon has its own handlers, a stop is no failure, and a reload has nothing to reload. Modules that take
-    # long to import are imported only after this.
+    # long to import are imported only after this; some would turn an exception of a handler into an error of their own.
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: sys.exit(0))
+        signal.signal(number, lambda *_: os._exit(0))
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     # A process inherits its parent's signal mask, in which these signals may be blocked.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGHUP})
