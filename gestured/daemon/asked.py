@@ -75,7 +75,7 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     early: list[str] = []  # sentences that are logged only if opening succeeds, since else the error says them
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:
-        raise ModelError("; ".join(early))
+        raise ModelError("; ".join(str(rung.refused) for rung in ladder.rungs[: ladder.rung]))
     ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
         ladder.report(sentence)
