@@ -55,8 +55,8 @@ def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
         if found is None:
             sizes = " or ".join(map(str, seen.taxels()))
             return [f"# {name}: {sizes} values are no grid of {SIDES[0]} to {SIDES[1]} rows and columns"]
-        grid = found
-        keys.append(f'grid = "{grid[0]}x{grid[1]}"')
+        grid, remark = found
+        keys.append(f'grid = "{grid[0]}x{grid[1]}"{remark}')
     habits = _habits(seen, grid, inverted)
     if not keys and habits.exchanges > habits.fits:
         keys.append(f'grid = "{grid[1]}x{grid[0]}"  # rows and columns: neighbours fit better this way round')
@@ -65,8 +65,11 @@ def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
     return [f"[sensors.{name}]", *keys] if keys else []
 
 
-def _shape(seen: Seen, taxels: int) -> Grid | None:
-    """The grid of so many taxels in which a touch looks like a finger's, else the squarest; None if there is none."""
+def _shape(seen: Seen, taxels: int) -> tuple[Grid, str] | None:
+    """The grid of so many taxels in which a touch looks like a finger's, else the squarest, with a remark.
+
+    None if there is no such grid.
+    """
     sides = range(SIDES[0], SIDES[1] + 1)
     shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
     shapes.sort(key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
@@ -80,8 +83,8 @@ def _shape(seen: Seen, taxels: int) -> Grid | None:
         alike = {shape: neighbours_alike(strongest, shape[1]) for shape in shapes}
         best = max(shapes, key=alike.__getitem__)
         if alike[best] > ALIKE:
-            return best
-    return shapes[0]
+            return best, ""
+    return shapes[0], "  # a guess: touch the sensor, and ask again" if len(shapes) > 1 else ""
 
 
 def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:

@@ -52,7 +52,10 @@ def test_a_counter_before_ints_is_told_from_a_taxel(tmp_path) -> None:
 
 def test_a_grid_is_proposed_whether_or_not_somebody_touched_it(tmp_path) -> None:
     idle = seen(floats("/arm/pressure", np.zeros((6, 4)) + n % 2, n) for n in range(8))
+    touched = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(swipes(4, 6)))
     assert valid(propose(idle.rows()), tmp_path)["arm"][0] in ((6, 4), (4, 6))
+    assert "a guess" in propose(idle.rows())[1]
+    assert propose(touched.rows())[1] == 'grid = "4x6"'
     prime = seen(encoding.message("/arm/pressure", "f" * 83, (np.zeros(83),)) for _ in range(8))
     (words,) = propose(prime.rows())
     assert words.startswith("# ") and "83" in words and "no grid" in words
