@@ -49,7 +49,8 @@ class Addresses:
             pattern.split("{sensor}") for pattern in (self.pressure, self.trajectory)
         )
         if _rest(before, other_before, str.removeprefix) and _rest(after, other_after, str.removesuffix):
-            raise ValueError(f"trajectory: {self.trajectory!r} cannot be told from pressure {self.pressure!r}")
+            expected = f"an address that can be told from pressure {self.pressure!r}"
+            raise ValueError(f"trajectory: expected {expected}, found {self.trajectory!r}")
 
     def match(self, address: str) -> tuple[str, str] | None:
         """`("pressure" or "trajectory", sensor)`, or None for an address that is no sensor's."""

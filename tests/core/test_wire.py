@@ -117,7 +117,7 @@ def test_patterns_that_cannot_work_are_refused(pattern: str) -> None:
     ],
 )
 def test_patterns_that_one_address_fits_both_are_refused(pressure: str, trajectory: str) -> None:
-    with pytest.raises(ValueError, match="cannot be told"):
+    with pytest.raises(ValueError, match="expected an address that can be told"):
         Addresses(pressure, trajectory)
 
 
