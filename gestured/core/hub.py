@@ -10,8 +10,8 @@ sensors go on, since a daemon in a vehicle must not die of one sensor's odd fram
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 from gestured.core import bank
@@ -60,7 +60,7 @@ class Hub:
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
-        facts = [] if now < self.gates.due else self._lapse(now)
+        facts = [] if now < self.gates.due else self._shut(now, partial(self.gates.lapse, now))
         if self._missed:  # only the next frame of each sensor shows whether it has missed packets
             self._banks.doubted, self._missed = set(self._sensors), False
         together = len(packets) >= bank.FEW
@@ -150,7 +150,7 @@ class Hub:
 
     def tick(self, now: float) -> list[Fact]:
         """Do what the time alone decides (`wait`, silences, gates, arming), after all that arrived until `now`."""
-        facts = [] if now < self.gates.due else self._lapse(now)
+        facts = [] if now < self.gates.due else self._shut(now, partial(self.gates.lapse, now))
         facts += self.wait(now)
         sensors = self._sensors.values()
         self._banks.show()
@@ -198,20 +198,17 @@ class Hub:
 
         While a gate is closed each contact is unknown, and so is one that began before it was closed or opened.
         """
-        self.gates.inhibit(sensor, gate, now + seconds)
-        return self._shut(now)
+        return self._shut(now, partial(self.gates.inhibit, sensor, gate, now + seconds))
 
     def allow(self, sensor: str | None, gate: str, now: float) -> list[Fact]:
         """Open a gate for a sensor or (None) for all."""
-        self.gates.allow(sensor, gate)
-        return self._shut(now)
+        return self._shut(now, partial(self.gates.allow, sensor, gate))
 
     def put(self, sensor: str, closed: Iterable[str], now: float, armed_until: float | None = None) -> list[Fact]:
         """Close exactly these gates for a sensor; one that is not there yet will come armed until `armed_until` (s)."""
-        self.gates.put(sensor, closed)
         if armed_until is not None:
             self._armed[sensor] = armed_until
-        return self._shut(now)
+        return self._shut(now, partial(self.gates.put, sensor, closed))
 
     def foresee(self, sensors: Collection[str] | None) -> None:
         """Give provisional events of these sensors, by name, or of all (None). Answers stay what they are.
@@ -290,13 +287,12 @@ class Hub:
         listening.gate(self.gates.of(name), now)
         return Reading("no_data", self.scene.grid_of(name), gate=listening.told(name, now, -math.inf))
 
-    def _lapse(self, now: float) -> list[Fact]:
-        """Open the gates that open by themselves until now."""
-        self.gates.lapse(now)
-        return self._shut(now)
-
-    def _shut(self, now: float) -> list[Fact]:
-        facts: list[Fact] = []
+    def _shut(self, now: float, change: Callable[[], None]) -> list[Fact]:
+        """Make a change of gates; the facts tell of each sensor, heard or in the scene, that has other gates then."""
+        before = {name: self.gates.of(name) for name in self.scene.sensors if name not in self._sensors}
+        change()
+        changed = [name for name, closed in before.items() if closed != self.gates.of(name)]
+        facts: list[Fact] = [gate for name in changed if (gate := self._unheard(name, now).gate) is not None]
         for sensor in self._out(now, facts):
             sensor.shut(self.gates.of(sensor.name), now, facts)
         return facts

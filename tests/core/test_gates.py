@@ -112,6 +112,15 @@ def test_a_gate_for_all_is_closed_for_a_sensor_that_comes_later_and_opens_by_its
     assert hub.readings(9.2)["seat"].gate == Gate("seat", None, ("door",), None, 9.2), "it survives a reload"
 
 
+def test_whoever_asks_is_told_of_a_sensor_of_the_scene_before_it_is_heard() -> None:
+    """Its gates stand in `hello`, too: a client that was not told would show it as silent for ever."""
+    hub = Hub(replace(SCENE, sensors={"arm": Setup()}, gates=("door",)), Sure())
+    assert gates(hub.inhibit("arm", "seat", 1.0, 2.0)) == [("arm", None, ("door", "seat"))]
+    assert gates(hub.tick(3.5)) == [("arm", None, ("door",))]
+    assert gates(hub.allow(None, "door", 4.0)) == [("arm", None, ())]
+    assert not hub.allow(None, "door", 5.0) and not hub.inhibit("seat", "door", 6.0)
+
+
 def test_a_sensor_that_lost_its_place_comes_back_as_silent_as_it_was() -> None:
     hub = Hub(replace(SCENE, max_sensors=1), Sure())
     (_, packet, source) = DRIVE[0]
