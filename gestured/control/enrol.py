@@ -6,10 +6,11 @@ from typing import Any
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
+from gestured.client.values import number, sensor_name
 from gestured.control.address import add_sockets, connect
-from gestured.core.own import is_name
+from gestured.core.own import EXAMPLES, is_name
 
-EXAMPLES = 3
+USUAL = 3
 
 
 def add(commands: Commands) -> None:
@@ -25,10 +26,9 @@ def add(commands: Commands) -> None:
         "  gesturectl enrol wave --sensor armrest --examples 5",
     )
     parser.add_argument("name", metavar="NAME", type=_name, help="a-z first, then a-z, 0-9 and _; at most 32")
-    parser.add_argument("--sensor", metavar="SENSOR", required=True, help="where it is performed")
-    parser.add_argument(
-        "--examples", type=int, default=EXAMPLES, metavar="N", help=f"how often, 1 to 5 (default: {EXAMPLES})"
-    )
+    parser.add_argument("--sensor", type=sensor_name, metavar="SENSOR", required=True, help="where it is performed")
+    text = f"how often, 1 to {EXAMPLES} (default: {USUAL})"
+    parser.add_argument("--examples", type=number(1, EXAMPLES, whole=True), default=USUAL, metavar="N", help=text)
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
     parser.set_defaults(run=run)

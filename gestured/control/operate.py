@@ -7,7 +7,7 @@ from typing import Any
 
 from gestured.client.program import Commands, Parser
 from gestured.client.say import tell
-from gestured.client.values import number
+from gestured.client.values import number, sensor_name
 from gestured.control.address import add_sockets, connect
 from gestured.control.status import own_faults
 
@@ -30,7 +30,7 @@ def add(commands: Commands) -> None:
         "second without movement. Refused while the sensor is touched: a hand is no baseline.",
         epilog="example:\n  gesturectl recalibrate --sensor armrest",
     )
-    parser.add_argument("--sensor", metavar="NAME", help="only this sensor (default: all)")
+    parser.add_argument("--sensor", type=sensor_name, metavar="NAME", help="only this sensor (default: all)")
     _asks(parser, "recalibrate", "sensor")
     parser = commands.add_parser(
         "emit",
@@ -41,7 +41,8 @@ def add(commands: Commands) -> None:
         epilog="example:\n  gesturectl emit swipe_left --sensor armrest",
     )
     parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
-    parser.add_argument("--sensor", metavar="NAME", help="the sensor named in the event (default: test)")
+    text = "the sensor named in the event (default: test)"
+    parser.add_argument("--sensor", type=sensor_name, metavar="NAME", help=text)
     _asks(parser, "emit", "gesture", "sensor")
     _add_gates(commands)
     parser = commands.add_parser(
@@ -80,9 +81,10 @@ def _add_gates(commands: Commands) -> None:
     )
     for parser in (inhibit, allow):
         which = parser.add_mutually_exclusive_group(required=True)
-        which.add_argument("sensor", nargs="?", metavar="SENSOR", help="one sensor")
+        which.add_argument("sensor", nargs="?", type=sensor_name, metavar="SENSOR", help="one sensor")
         which.add_argument("--all", action="store_true", help="all sensors, and all that come")
-        parser.add_argument("--gate", required=True, metavar="NAME", help="the gate, by a name of your choice")
+        text = "the gate, by a name of your choice"
+        parser.add_argument("--gate", type=sensor_name, required=True, metavar="NAME", help=text)
     text = "seconds after which the gate opens by itself (default: it does not)"
     inhibit.add_argument("--for", dest="seconds", type=number(0.001, 1e9), metavar="S", help=text)
     _asks(inhibit, "inhibit", "gate", "sensor", "seconds")

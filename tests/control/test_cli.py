@@ -51,6 +51,9 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model() -> None:
         ("sniff", "--seconds", "0"), ("status", "--socket", ""), ("status", "--control", "/"),
         ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
         ("inhibit --all --gate door", "--for", "0"), ("inhibit --all --gate door", "--for", "soon"),
+        ("enrol knock --sensor arm", "--examples", "6"), ("enrol knock", "--sensor", "an arm"),
+        ("recalibrate", "--sensor", "an arm"), ("emit swipe_left", "--sensor", "an arm"),
+        ("allow arm", "--gate", "a door"),
     ],
 )  # fmt: skip
 def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: str, value: str) -> None:
