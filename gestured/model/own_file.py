@@ -96,5 +96,5 @@ def write(path: Path, gestures: Examples, model: str) -> OwnFile:
         with atomic_write(path, PRIVATE) as file:
             file.write(data)
     except OSError as error:
-        raise OwnFileError(f"{path}: cannot be written: {error.strerror}; nothing has changed") from error
+        raise OwnFileError(f"{path}: cannot be written: {error.strerror}") from error
     return OwnFile(path, gestures, None, hashlib.sha256(data).hexdigest())

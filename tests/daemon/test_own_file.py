@@ -103,6 +103,8 @@ def test_where_it_cannot_be_written_or_read_that_is_said(path: str, words: str) 
     assert words in str(keeper.fault)
     with pytest.raises(OwnFileError, match="cannot be written"):
         keeper.hold()
+    with pytest.raises(OwnFileError, match="cannot be written: [^;]+$"):  # who hears it knows what has not changed
+        own_file.write(Path(path), {}, "")
 
 
 def test_a_folder_into_which_we_may_not_look_is_a_fault_of_the_file(tmp_path: Path, nobody) -> None:
