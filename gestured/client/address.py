@@ -115,7 +115,7 @@ def setting(environ: Mapping[str, str], key: str) -> str | None:
 
     try:
         with open(path, "rb") as file:
-            value = tomllib.load(file).get(key)
+            value = tomllib.loads(file.read().decode("utf-8-sig")).get(key)
     except (OSError, ValueError):  # the daemon itself reports what is wrong with the file
         return None
     return value if isinstance(value, str) else None

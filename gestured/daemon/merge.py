@@ -33,7 +33,7 @@ def _from_file(path: str) -> dict[str, Any]:
             data = file.read(MAX_CONFIG_BYTES + 1)
         if len(data) > MAX_CONFIG_BYTES:
             raise OSError(errno.EFBIG, "is too large", path)
-        found = tomllib.loads(data.decode())
+        found = tomllib.loads(data.decode("utf-8-sig"))  # some editors write a byte order mark
     except OSError as error:
         limit = f"{MAX_CONFIG_BYTES >> 20} MiB"
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error

@@ -42,7 +42,7 @@ def test_either_socket_finds_the_daemon(run, daemon: Daemon) -> None:
 def test_the_variables_that_the_daemon_takes_find_it(run, daemon: Daemon, tmp_path: Path) -> None:
     events, control = daemon.ready["socket"], daemon.ready["control"]
     file = tmp_path / "gestured.toml"
-    file.write_text(f'socket = "{events}"\n')
+    file.write_text(f'socket = "{events}"\n', "utf-8-sig")
     for given in ({"GESTURED_SOCKET": events}, {"GESTURED_CONTROL": control}, {"GESTURED_CONFIG": str(file)}):
         status, out, err = run("status", "--json", env=given)
         assert status == 0 and json.loads(out)["addresses"]["socket"] == events, (given, err)

@@ -283,7 +283,7 @@ def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) ->
 
 def test_gestures_in_use_are_written_alike_with_tables_of_gestures_beside_them(model: Path, tmp_path: Path) -> None:
     config = tmp_path / "gestured.toml"
-    config.write_text('[gestures]\nuse = "one_tap, swipe_left"\n')
+    config.write_text('[gestures]\nuse = "one_tap, swipe_left"\n', "utf-8-sig")  # as some editors write it
     assert "gestures one_tap, swipe_left" in explain(*settings_of("--model", model, "--config", config))
 
 
