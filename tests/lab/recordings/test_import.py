@@ -72,6 +72,18 @@ def test_a_bad_line_is_left_out_and_told(kind: str, tmp_path: Path, capsys: pyte
     np.testing.assert_array_equal(read(out).frames, made.frames)
 
 
+@pytest.mark.parametrize(("scale", "unit", "rate"), [(1e3, "s", "0.0"), (1.0, "ms", "1.")])
+def test_times_in_another_unit_are_refused_though_frames_were_lost(
+    scale: float, unit: str, rate: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = csv_lines(take(), scale)
+    file = written(tmp_path / "a.csv", lines[:5] + lines[9:])
+    status, text, _ = run(capsys, "--participant", "07", "--time-unit", unit, file, "--out", tmp_path / "out.npz")
+    assert status == 1
+    assert text.startswith(f"{file}: time: expected 2 to 2500 frames a second, found {rate}")
+    assert text.endswith("; see --time-unit\n")
+
+
 def test_a_file_of_another_form_is_refused_and_the_others_are_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
