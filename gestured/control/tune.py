@@ -21,6 +21,8 @@ from gestured.core.points import USUAL
 from gestured.core.sensor import ABSENT_S
 from gestured.model.model import Model
 from gestured.model.opening import open_model
+from gestured.record.check import UNNAMED
+from gestured.record.judge import NONE
 from gestured.record.replay import Replay
 
 BAR = 36  # characters
@@ -87,7 +89,10 @@ def play(path: Path, model: Model, played: Played) -> None:
     events = [line for line in lines if line["type"] == "gesture"]
     if isinstance(source, Labelled):
         played.seconds += source.seconds
-        played.add([*source.performed()], events, partial(replay.knew, "recording"))
+        performed = [*source.performed()]
+        for one in performed:  # a gesture of the user's own is enrolled: no threshold of the model's finds or loses it
+            one.label = one.label if one.label in (*model.gestures, NONE) else UNNAMED
+        played.add(performed, events, partial(replay.knew, "recording"))
     else:
         # A sensor that sends only while it is touched counts as present in pauses, but in none longer than ABSENT_S.
         steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))

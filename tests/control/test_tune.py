@@ -214,8 +214,8 @@ def test_a_gesture_of_which_nobody_marked_the_onset_begins_where_it_stands_out(
 def test_what_is_said_of_a_performance_that_is_left_out_counts_neither_way(
     models: dict[bool, Model], tmp_path: Path
 ) -> None:
-    """It began before the sensor was known, or nobody knows what it was."""
-    for n, (onset, label) in enumerate([(0, "one_tap"), (30, "other")]):
+    """It began before the sensor was known, nobody knows what it was, or it is no gesture of the model."""
+    for n, (onset, label) in enumerate([(0, "one_tap"), (30, "other"), (30, "knock")]):
         play(taps(tmp_path / f"{n}.npz", onset=onset, label=label), models[False], played := Played())
         assert (played.skipped, played.performed, played.said) == (3, [], [])
     play(taps(tmp_path / "others.npz", onset=None, label="none"), models[False], played)
