@@ -26,6 +26,7 @@ from gestured.record.judge import NONE
 from gestured.record.replay import Replay
 
 BAR = 36  # characters
+ENOUGH_H = 1.0  # hours; fewer cannot show a few false gestures an hour
 SHORTEST_S = 60.0  # the shortest recordings without gestures from which a threshold can be judged
 
 
@@ -145,6 +146,8 @@ def _words(tuned: Tuned) -> Iterator[str]:
         yield "proposed nothing: nobody performed a gesture, and the model does not say what it misses"
         return
     yield f"proposed {_said(tuned, best, tuned.strictness)}"
+    if not tuned.budget and played.hours < ENOUGH_H and (best.missed or 0) < (tuned.now.missed or 0):
+        yield "more may be false than now: these minutes cannot show it, hours of a tape can"
     if tuned.strictness:
         yield from ("for the configuration file, above its tables:", f'strictness = "{tuned.strictness}"')
         return

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.control import labelled
-from gestured.control.tune import play
+from gestured.control.tune import _words, play
 from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, tune
 from gestured.core.errors import GesturedError
 from gestured.core.points import STRICTNESS
@@ -220,6 +220,20 @@ def test_what_is_said_of_a_performance_that_is_left_out_counts_neither_way(
         assert (played.skipped, played.performed, played.said) == (3, [], [])
     play(taps(tmp_path / "others.npz", onset=None, label="none"), models[False], played)
     assert counted(played, 0.0).false == 3
+
+
+@pytest.mark.parametrize(("hours", "confidence", "told"), [(0.1, 0.1, True), (0.1, 0.99, False), (9.0, 0.1, False)])
+def test_minutes_of_gestures_are_said_to_show_nothing_of_what_is_false(
+    models: dict[bool, Model], hours: float, confidence: float, told: bool
+) -> None:
+    """In them nothing false is said at any threshold, and so the lowest one seems to cost nothing."""
+    for model in models.values():
+        played = Played(seconds=3600 * hours)
+        acts = [Performed("one_tap", "", 9.0 * k, 9.0 * k + 0.3) for k in range(30)]
+        played.add(acts, [event("one_tap", act.onset, confidence) for act in acts])
+        words = [*_words(tune(model, played, None))]
+        assert any("these minutes cannot show it" in line for line in words) == told
+        assert max(map(len, words)) <= 80
 
 
 def test_few_hours_do_not_make_it_say_more(models: dict[bool, Model]) -> None:
