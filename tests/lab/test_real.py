@@ -12,7 +12,7 @@ from gestured.lab.evaluate import outcome
 from gestured.lab.fit import targets
 from gestured.lab.study.cohort import real
 from gestured.record.arrays import write
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, SimulatedSensor
 from tests.lab.adapt.recorded import cut_gestures
 
 
@@ -42,7 +42,7 @@ def test_too_few_people_to_hold_one_out_are_refused(tmp_path: Path) -> None:
     paths = []
     for count, names in enumerate((("anna", "berta"), ("carla",)), 1):
         paths.append(tmp_path / f"{count}.npz")
-        write(paths[-1], cut_gestures(names, GESTURES, repeats=2 // count))
+        write(paths[-1], cut_gestures(names, GESTURES, repeats=2 // count, sensor=SimulatedSensor.nominal(day=count)))
     with pytest.raises(GesturedError, match=r"--recordings: expected gestures of at least 3 people, found 2"):
         train._real(None, paths[:1])
     found = train._real(None, paths)

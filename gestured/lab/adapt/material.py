@@ -6,6 +6,7 @@ A name that the model does not know is left out: it is neither taught nor reject
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +50,9 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
     missed: list[tuple[int, int]] = []
     left: Counter[str] = Counter()
     grid: tuple[int, ...] | None = None
+    seen: dict[bytes, Path] = {}
     for path in paths:
-        found = _read(path)
+        found = _read(path, seen)
         if grid is not None and found.frames.shape[1:] != grid:
             here, before = ("x".join(map(str, shape)) for shape in (found.frames.shape[1:], grid))
             raise RecordingError(
@@ -128,13 +130,20 @@ def _dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int
     return found
 
 
-def _read(path: Path) -> Recordings:
+def _read(path: Path, seen: dict[bytes, Path]) -> Recordings:
+    """Read a file; `seen` has the file of each recording that was read: a copy would be learned from while held out."""
     found = read(path)
     lengths = np.diff(found.offsets)
     if not len(found):
         raise RecordingError(f"{path}: labels: expected recordings, found none")
     if (lengths < 2).any():
         raise RecordingError(f"{path}: frames of recording {int(np.argmin(lengths))}: expected more than one")
+    for i in range(len(found)):
+        times, frames = found.times_of(i), np.asarray(found.frames_of(i), np.float32)
+        key = sha256(np.round(times - times[0], 6).tobytes() + frames.tobytes()).digest()
+        if key in seen:
+            raise RecordingError(f"{path}: frames of recording {i}: expected no copy of one in {seen[key]}")
+        seen[key] = path
     return found
 
 

@@ -95,12 +95,14 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
     np.savez(tmp_path / "nan.npz", **{k: v for k, v in vars(replace(good, frames=frames)).items() if v is not None})
     write(tmp_path / "wide.npz", replace(good, frames=np.repeat(good.frames, 2, axis=2)))
     count = 1001  # people, each with two frames
-    frames, times = np.zeros((2 * count, 9, 9), np.uint8), np.tile([0.0, 0.1], count)
+    frames, times = np.arange(162.0 * count, dtype=np.float32).reshape(-1, 9, 9), np.tile([0.0, 0.1], count)
     labels = np.array(["one_tap"] * count)
     crowd = Recordings(frames, times, np.arange(0, 2 * count + 1, 2), labels, np.arange(count))
     write(tmp_path / "crowd.npz", crowd)
     write(tmp_path / "still.npz", replace(good, frames=np.full_like(good.frames, 100)))
     (tmp_path / "text.npz").write_text("no recording")
+    copies = good.take(np.array([5, 0]))
+    write(tmp_path / "copies.npz", replace(copies, subjects=np.array(["berta"] * 2), times=copies.times + 9.0))
     for names, reason in (
         (["text.npz"], "text.npz: cannot be read as a recording"),
         (["few.npz"], r"few.npz: expected at least 20 gestures of the model, found 3"),
@@ -109,6 +111,8 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
         (["bare.npz"], r"bare.npz: event_labels: missing"),
         (["nan.npz"], r"nan.npz: frames of recording 0: expected finite values"),
         (["good.npz", "wide.npz"], r"wide.npz: frames: expected the grid 9x9 .* found 9x18"),
+        (["good.npz", "good.npz"], r"good.npz: frames of recording 0: expected no copy of one in .*good.npz"),
+        (["good.npz", "copies.npz"], r"copies.npz: frames of recording 0: expected no copy of one in .*good.npz"),
         (["crowd.npz"], r"subjects: expected at most 1000 people"),
         (["still.npz"], rf"still.npz: expected gestures that the front end cuts out, found 0 of {len(good)};"),
     ):
