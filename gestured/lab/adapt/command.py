@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import tempfile
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)  # networks this small are slower on two threads, above all on a busy machine
     base = base_of(args.base)
     own = own_recordings(args.recordings, args.as_none)
+    learned_from = _learned_from(base, args.recordings)
     cache = args.cache or cache_folder()
     cache.mkdir(parents=True, exist_ok=True)
     takes = simulate(cache, JOBS)
@@ -63,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         _tell(own, found)
     if written:
-        _write(found, out, _facts(base, own, found, takes.teach, args.recordings), cache)
+        _write(found, out, _facts(base, own, found, takes.teach, learned_from), cache)
     if args.json:
         say_json(_figures(own, found) | {"written": str(out) if written else None, "reasons": reasons})
     else:
@@ -81,11 +83,22 @@ def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
         write(out, made.read_bytes())
 
 
-def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:
+def _learned_from(base: Base, recordings: list[Path]) -> list[dict[str, Any]]:
+    """All that the new model learns from. Raises GesturedError if its base has learned from the same recordings."""
+    before, new = json.loads(base.model.properties.get(KEY, "[]")), origins(recordings)
+    for old, one in product(before, new):
+        if old["sha256"] == one["sha256"] or old["consents"].items() & one["consents"].items():
+            raise GesturedError(
+                f"--base: {base.model.name} has learned from {old['file']}, so that nobody in {one['file']} can be "
+                "held out; expected the model that it was made of, and all recordings"
+            )
+    return [*before, *new]
+
+
+def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, learned_from: list[dict[str, Any]]) -> Facts:
     """The facts that the new file holds."""
     new, gestures = found.new, own.samples.take(own.samples.labels != NONE)
     cut = new.answers.confidence >= 0
-    before = json.loads(base.model.properties.get(KEY, "[]"))
     learned = base.model.metadata.training_data + own.samples.digest() + simulated.digest()
     return Facts(
         kind=base.kind,
@@ -98,7 +111,7 @@ def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings:
         classes=CLASSES,
         context=base.model.metadata.context,
         provisional=found.provisional,
-        learned_from=[*before, *origins(recordings)],
+        learned_from=learned_from,
     )
 
 

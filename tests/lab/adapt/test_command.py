@@ -10,14 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
+from gestured.lab.adapt.weights import base_of
 from gestured.lab.cli import main
 from gestured.lab.own import learn as own
 from gestured.lab.own.learn import Seen
-from gestured.lab.recordings.origin import said
+from gestured.lab.recordings.origin import KEY, origins, said
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.arrays import write
@@ -160,7 +162,7 @@ def test_a_disk_without_room_for_the_model_takes_no_figures_away(
         def reasons(self) -> list[str]:
             return []
 
-    for name in ("base_of", "own_recordings", "simulate", "_facts"):
+    for name in ("base_of", "own_recordings", "simulate", "_learned_from", "_facts"):
         monkeypatch.setattr(command, name, lambda *_: argparse.Namespace(teach=None))
     monkeypatch.setattr(command, "adapt", lambda *_: Better())
     monkeypatch.setattr(command, "_tell", lambda *_: print("right 0.9"))
@@ -195,6 +197,26 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
     assert (status, out) == (1, "")
     assert reason in err and err.startswith("gestured-lab: ") and err.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz"]
+
+
+def test_a_base_that_has_learned_from_a_recording_or_a_person_is_refused(run: Run, base: Path, tmp_path: Path) -> None:
+    """Nobody could be held out of it; another person's recordings may go on from it."""
+    made = cut_gestures(("07", "08"), GESTURES, repeats=2)
+    write(tmp_path / "a.npz", made)
+    write(tmp_path / "longer.npz", made.take(np.arange(len(made) - 1)))
+    write(tmp_path / "others.npz", replace(made, subjects=np.char.add(made.subjects, "b")))
+    taught, proto = tmp_path / "taught.onnx", onnx.load(base)
+    entry = next(entry for entry in proto.metadata_props if entry.key == KEY)
+    entry.value = json.dumps([*json.loads(entry.value), *origins([tmp_path / "a.npz"])])
+    for entry in [entry for entry in proto.metadata_props if entry.key == "digest"]:
+        proto.metadata_props.remove(entry)
+    onnx.save(proto, taught)
+    for name in ("a.npz", "longer.npz"):
+        status, _, err = run(name, "--out", "my.onnx", "--base", taught, "--force")
+        assert status == 1
+        assert f"--base: taught has learned from a.npz, so that nobody in {name} can be held out" in err
+    files = [origin["file"] for origin in command._learned_from(base_of(str(taught)), [tmp_path / "others.npz"])]
+    assert files == ["old.npz", "a.npz", "others.npz"]
 
 
 def test_a_cache_that_cannot_be_made_is_told_before_anything_is_simulated(
