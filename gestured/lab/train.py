@@ -122,7 +122,7 @@ def load_data(
     person = both.people % 1000
     plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
     own = both.take(person < 24)
-    performed = _performed(real) if found else {}
+    performed = _performed(real, recordings) if found else {}
     return TrainingData(
         join([teach, days, own]),
         len(own),
@@ -158,10 +158,11 @@ def _real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int
     return (join(parts), len(parts[0])) if parts else None
 
 
-def _performed(folder: Path | None) -> dict[str, int]:
-    """By judging set, how many gestures the file of cut gestures holds, cut out again by the front end or not."""
-    paths = _real_files(folder)
-    labels = read(paths[0]).labels.astype(str) if paths else np.zeros(0, str)
+def _performed(folder: Path | None, recordings: Sequence[Path]) -> dict[str, int]:
+    """By judging set, how many gestures the files that judge hold, cut out again by the front end or not."""
+    judge = [read(path) for path in _real_files(folder)[:1] or recordings]
+    parts = [of for found in judge for of in (found.labels, found.event_labels) if of is not None]
+    labels = np.concatenate([np.zeros(0, np.str_), *parts])
     return {title: int((is_of(labels, title) & np.isin(labels, GESTURES)).sum()) for title in REAL_SETS}
 
 

@@ -13,7 +13,7 @@ from gestured.lab.fit import targets
 from gestured.lab.study.cohort import real
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES, SimulatedSensor
-from tests.lab.adapt.recorded import cut_gestures
+from tests.lab.adapt.recorded import cut_gestures, whole_session
 
 
 @pytest.fixture
@@ -54,9 +54,21 @@ def test_what_was_never_cut_is_lost_and_what_is_in_both_files_counts_once(folder
     assert found is not None
     samples, judged = found
     assert len(samples) == 5 and judged == 3
-    performed = train._performed(folder)
+    performed = train._performed(folder, [])
     assert performed == {"taps and swipes": 4, "with non-gestures": 4}
     once = samples.take(np.arange(judged))
     surely = np.eye(10, dtype=np.float32)[targets(once)], np.zeros(judged, np.float32)
     result = outcome(surely, targets(once), 0.5, performed["taps and swipes"])
     assert (result.gestures, result.right, result.wrong, result.lost) == (4, 0.75, 0.0, 0.25)
+
+
+def test_own_recordings_of_which_nothing_is_cut_out_count_as_performed(tmp_path: Path) -> None:
+    made, session = cut_gestures(("0",), ("swipe_up", "circle_clockwise", "scribble")), whole_session("1")
+    still = np.repeat(made.frames[:1], len(made.frames), axis=0)
+    write(tmp_path / "cut.npz", replace(made, frames=still))
+    write(tmp_path / "session.npz", session)
+    assert session.event_labels is not None
+    known = [label for label in session.event_labels.tolist() if label in GESTURES]
+    strokes = [label for label in known if label == "one_tap" or label.startswith("swipe")]
+    performed = train._performed(None, [tmp_path / "cut.npz", tmp_path / "session.npz"])
+    assert performed == {"taps and swipes": 1 + len(strokes), "with non-gestures": 2 + len(known)}
