@@ -1,15 +1,16 @@
 """The values on a command line, for argparse's `type`: each is read, or refused in one sentence."""
 
 from argparse import ArgumentTypeError
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from gestured.client.address import named
 from gestured.core.address import Address, Grid, is_sensor
+from gestured.core.errors import GesturedError
 
 
 def host_port(text: str) -> Address:
-    """The address of a peer; port 0 is refused. Raises ArgumentTypeError, as all functions here."""
+    """The address of a peer; port 0 is refused. Raises ArgumentTypeError, as all that read a text."""
     try:
         address = named(text)
         if address.port:
@@ -76,3 +77,11 @@ def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
         return words
 
     return read
+
+
+def each_once(paths: Iterable[Path]) -> None:
+    """Raise GesturedError if a file is named twice: its hours would count twice."""
+    known: dict[Path, Path] = {}
+    for path in paths:
+        if (first := known.setdefault(path.resolve(), path)) is not path:
+            raise GesturedError(f"{path}: expected each file once, found it as {first}, too")

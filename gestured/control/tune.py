@@ -11,7 +11,7 @@ from typing import Any
 
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
-from gestured.client.values import number
+from gestured.client.values import each_once, number
 from gestured.control.diff import Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.tuning import ENOUGH, Counts, Played, Tuned, tune
@@ -54,8 +54,8 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play all recordings, count, and print figures and proposal. Raises RecordingError if they are too short."""
-    model = open_model(args.model)
-    played = Played()
+    each_once(args.recordings)
+    model, played = open_model(args.model), Played()
     for path in args.recordings:
         play(path, model, played)
     if not played.performed and played.seconds < SHORTEST_S:

@@ -249,6 +249,7 @@ def test_what_cannot_be_tuned_on_is_one_sentence(run, recorded: Path, tmp_path: 
     for arguments, reason in (
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
         ([tmp_path / "none.mcap"], "none.mcap"),
+        ([recorded, recorded], "07.npz: expected each file once"),
         ([recorded, "--budget", "0.5"], "hours cannot show it, even if nothing false was said in them, expected at"),
         ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),
         ([recorded, "--model", "nobody"], "nobody: no shipped model"),

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from gestured.client.say import say_drawn
+from gestured.client.values import each_once
 from gestured.core.errors import GesturedError
 from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
@@ -87,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     """Raise GesturedError for options that do not go together, before anything is played."""
+    each_once(args.recordings)
     if args.document and args.recordings:
         raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
     if not 0 < args.seconds <= LONGEST_S:
