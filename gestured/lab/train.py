@@ -194,11 +194,11 @@ class Trained:
     _kept: dict[tuple[str, str], Evidence] = field(default_factory=dict)
 
     def evidence(self, name: str, samples: Samples) -> Evidence:
-        """The evidence of a network and the trajectory net on samples, computed once for each set."""
+        """The evidence of a network and the trajectory net on samples; what they say is computed once for each set."""
         key = name, samples.digest()
         if key not in self._kept:
             self._kept[key] = Evidence.of(self.nets, name, samples)
-        return self._kept[key]
+        return self._kept[key].beside(samples.context)
 
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:

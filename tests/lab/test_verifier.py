@@ -11,9 +11,11 @@ import torch
 
 from gestured.core.points import STRICTNESS
 from gestured.lab.everyday.hours import LEVELS
+from gestured.lab.fit import build
 from gestured.lab.nets import Decision
 from gestured.lab.points import alike, operating_points
 from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, Samples
+from gestured.lab.train import Trained
 from gestured.lab.verifier import Evidence, fit_verifier, taught, with_past_of
 from gestured.model.context import NAMES, PAST
 from gestured.model.points import operating_points as parsed
@@ -40,6 +42,14 @@ def test_what_surrounds_a_contact_can_tell_what_was_meant() -> None:
     verifier = fit_verifier(decision, [(evidence(2000, covered), covered.astype(np.int64))], seed=1)
     _, unknown = evidence(2, np.array([False, True])).answers(decision, verifier)
     assert unknown[0] < 0.1 and unknown[1] > 0.9
+
+
+def test_evidence_that_is_kept_has_the_context_of_the_samples_that_are_asked_about() -> None:
+    one = samples(1)
+    trained = Trained(build(("lstm", "trajectory")), None)
+    for around in (one.context, one.context + 1):
+        found = trained.evidence("lstm", replace(one, context=around))
+        np.testing.assert_array_equal(found.context.numpy(), around)
 
 
 def test_a_take_has_the_past_of_everyday_life_and_measures_of_its_own() -> None:
