@@ -170,7 +170,7 @@ def _as_known(
             left.update([] if label == UNNAMED else [label])
             label = UNNAMED
         names.append(label)
-        fine.append(kind)
+        fine.append(NONE if label == NONE and kind in GESTURES else kind)  # a kind that is a gesture would be its class
     return np.array(names, dtype="U64"), np.array(fine, dtype="U1024")
 
 

@@ -37,6 +37,15 @@ def test_gestures_kinds_and_names_of_ones_own(tmp_path: Path) -> None:
     assert (rejected.samples.labels[rejected.samples.kinds == "wave"] == "none").all()
 
 
+def test_what_is_labelled_none_is_no_gesture_though_its_kind_is_the_name_of_one(tmp_path: Path) -> None:
+    made = cut_gestures(("anna",), GESTURES, repeats=3)
+    spoilt = np.where(made.labels == "swipe_left", "none", made.labels)  # performances that somebody has rejected
+    write(tmp_path / "a.npz", replace(made, labels=spoilt, kinds=made.labels))
+    own = own_recordings([tmp_path / "a.npz"], as_none=["swipe_up"]).samples
+    assert (own.labels == "none").sum() >= 5
+    np.testing.assert_array_equal(classes_of(own) == OTHER, own.labels == "none")
+
+
 def test_a_gesture_that_is_never_cut_out_counts_as_performed(tmp_path: Path) -> None:
     made = cut_gestures(("anna",), GESTURES, repeats=3)
     frames = made.frames.copy()
