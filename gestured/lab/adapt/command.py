@@ -137,7 +137,10 @@ def _tell(own: Own, found: Adapted) -> None:
     for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
     say(f"threshold {new.least:.3f}, at which no more are wrong than before", WORTH[new.groups.unit])
-    say("the model has no operating points: every strictness takes this threshold (gesturectl tune proposes others)")
+    say(
+        "the model has no operating points: every strictness takes this threshold, which may be laxer than normal was",
+        "(gestured-lab everyday counts what is false, gesturectl tune proposes other thresholds)",
+    )
 
 
 def _row(title: str, shares: Shares) -> str:
