@@ -180,7 +180,9 @@ class Session:
 
     def _keep(self, take: Captured, trial: Exercise) -> None:
         new = recording(take, trial, self.participant, self._consent, self.kind)
-        together = new if self.kept is None else join_recordings([self.kept, new])
+        # Read anew: meanwhile `forget` may have removed what was there, or another session have added to it.
+        before = already(self.path, self.participant, take.frames[0].values.shape)
+        together = new if before is None else join_recordings([before, new])
         write(self.path, together)
         self.kept = together
         self._terminal.say(f"  kept, {len(together)} in {self.path}")

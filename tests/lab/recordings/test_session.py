@@ -13,8 +13,9 @@ from gestured.lab.recordings import collect as module
 from gestured.lab.recordings.collect import Session
 from gestured.lab.recordings.protocol import left, order
 from gestured.lab.recordings.quality import Captured
+from gestured.lab.recordings.store import join_recordings
 from gestured.lab.recordings.terminal import Terminal
-from gestured.record.arrays import read
+from gestured.record.arrays import read, write
 from tests.lab.recordings.test_quality import performed
 
 TRIALS = order("07", 0, ["one_tap"], 1)
@@ -111,6 +112,24 @@ def test_a_non_gesture_is_none_with_its_kind_and_never_doubted(tmp_path: Path) -
     kept = read(tmp_path / "07.npz")
     assert (kept.labels.tolist(), kept.kinds.tolist()) == (["none"], ["scribble"])
     assert left(trials, kept) == []
+
+
+@pytest.mark.parametrize("forgotten", [True, False])
+def test_what_another_program_does_to_the_file_meanwhile_holds(forgotten: bool, tmp_path: Path) -> None:
+    """A recording that was forgotten does not come back, and one that another session has kept is not lost."""
+    path = tmp_path / "07.npz"
+
+    class Meanwhile(FakeSensor):
+        def begin(self) -> None:
+            super().begin()
+            if len(self.takes) == 2:  # one has been kept
+                again = read(path)
+                path.unlink() if forgotten else write(path, join_recordings([again, again]))
+
+    steps = ("in place", "\n"), ("Enter keep", "\n"), ("Enter keep", "\n")
+    script = run(path, Meanwhile(*[GOOD] * 4), *steps)
+    assert len(read(path)) == (1 if forgotten else 3)
+    assert "kept, 1 in" in script.shown
 
 
 def test_nothing_cannot_be_kept(tmp_path: Path) -> None:
