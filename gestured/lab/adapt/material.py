@@ -85,7 +85,7 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
     if (cut := int((own.samples.labels != NONE).sum())) < LEAST_CUT:
         raise GesturedError(
             f"{', '.join(map(str, paths))}: expected gestures that the front end cuts out, "
-            f"found {cut} of {own.performed}; are these the raw counts of a sensor?"
+            f"found {cut} of {own.performed}; are these a sensor's raw counts, at times in seconds?"
         )
     return own
 

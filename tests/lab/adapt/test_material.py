@@ -109,6 +109,7 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
     crowd = Recordings(frames, times, np.arange(0, 2 * count + 1, 2), labels, np.arange(count))
     write(tmp_path / "crowd.npz", crowd)
     write(tmp_path / "still.npz", replace(good, frames=np.full_like(good.frames, 100)))
+    write(tmp_path / "ms.npz", replace(good, times=good.times * 1e3))
     (tmp_path / "text.npz").write_text("no recording")
     copies = good.take(np.array([5, 0]))
     write(tmp_path / "copies.npz", replace(copies, subjects=np.array(["berta"] * 2), times=copies.times + 9.0))
@@ -124,6 +125,7 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
         (["good.npz", "copies.npz"], r"copies.npz: frames of recording 0: expected no copy of one in .*good.npz"),
         (["crowd.npz"], r"subjects: expected at most 1000 people"),
         (["still.npz"], rf"still.npz: expected gestures that the front end cuts out, found 0 of {len(good)};"),
+        (["ms.npz"], r"found 0 of \d+; are these a sensor's raw counts, at times in seconds\?"),
     ):
         with pytest.raises(GesturedError, match=reason) as told:
             own_recordings([tmp_path / name for name in names])
