@@ -60,7 +60,9 @@ def run(args: argparse.Namespace) -> int:
         play(path, model, played)
     if not played.performed and played.seconds < SHORTEST_S:
         found = f"{args.recordings[0]}: found {played.seconds:.0f} s in which nobody made a gesture"
-        raise RecordingError(f"{found}, expected at least {SHORTEST_S:.0f} s of that, or recorded gestures")
+        left = f"; {played.skipped} are left out, of unknown names or without a quiet second before them"
+        expected = f"expected at least {SHORTEST_S:.0f} s of that, or recorded gestures{left if played.skipped else ''}"
+        raise RecordingError(f"{found}, {expected}")
     tuned = tune(model, played, args.budget)
     if args.json:
         say_json(_figures(tuned))

@@ -267,6 +267,12 @@ def test_a_tape_that_is_too_short_is_told_how_long_it_is(run, tmp_path: Path, mo
     assert status == 1 and "short.mcap: found 3 s in which nobody made a gesture, expected at least 60 s of that" in err
 
 
+def test_gestures_that_begin_before_the_sensor_is_known_are_not_said_to_be_missing(run, tmp_path: Path) -> None:
+    status, _, err = run("tune", taps(tmp_path / "taps.npz", onset=5))
+    assert status == 1
+    assert "or recorded gestures; 3 are left out, of unknown names or without a quiet second before them\n" in err
+
+
 def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_miss_nothing(
     run, models: dict[bool, Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
