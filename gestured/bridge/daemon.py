@@ -106,10 +106,13 @@ class Daemon:
         return json.dumps(told, separators=(",", ":")).encode()
 
     def _heard(self, heard: Mapping[str, str]) -> None:
-        """Update the states of sensors. The dict is replaced, since another thread may read the old one."""
+        """Take the states of all sensors that a daemon knows; one that a restarted daemon does not know is silent.
+
+        The dict is replaced, since another thread may read the old one.
+        """
         wanted = self._wanted_sensors
         new = {name: state for name, state in heard.items() if wanted is None or name in wanted}
-        states = {name: state for name, state in self.states.items() if name not in new} | new
+        states = {name: "no_data" for name in self.states if name not in new} | new
         self.states = dict(list(states.items())[-MOST_SENSORS:])
 
     def _gestures(self, known: Sequence[str]) -> None:

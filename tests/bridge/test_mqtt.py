@@ -403,7 +403,19 @@ def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch)
     daemon = known.Daemon(None, None, Counts("mqtt"))
     for n in range(10):
         daemon.take(STATUS | {"sensors": {"armrest": "ok", f"invented{n}": "ok"}})
-    assert daemon.states == {"invented8": "ok", "armrest": "ok", "invented9": "ok"}
+    assert daemon.states == {"invented8": "no_data", "armrest": "ok", "invented9": "ok"}
+
+
+def test_a_sensor_that_a_restarted_daemon_does_not_know_is_silent(bridge, broker, listen, fake):
+    at = broker()
+    started(bridge, at, fake)
+    listener = listen(at.port, "gestured/car/armrest/state")
+    fake.say(STATUS)
+    listener.until("gestured/car/armrest/state", "ok")
+    fake.close()
+    fake.accept(HELLO | {"instance": "b", "sensors": {}})
+    fake.say(STATUS | {"sensors": {"door": "ok"}})
+    listener.until("gestured/car/armrest/state", "no_data")
 
 
 def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
