@@ -22,7 +22,9 @@ REFUSALS = {
     135: f"this user may not connect: {_LOGIN}",
     138: "we are banned: ask whoever runs it",
     142: "another bridge has the same name, {host}: give each its own with --host",
+    149: "it takes no packets as large as ours, which have a few KiB: let it take them",
     154: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
+    155: "it takes no messages with QoS 1, and others may get lost: let it take them",
 }
 CLOSED, SILENT = 128, 141  # codes of the library: the broker gave no code, or was silent for too long
 

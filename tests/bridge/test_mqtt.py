@@ -550,9 +550,19 @@ def test_a_login_that_is_no_text_is_refused_and_not_shown(refused, tmp_path: Pat
     assert "MQTT_PASSWORD: expected text in UTF-8" in said and "gr" not in said.partition("MQTT_PASSWORD")[2]
 
 
-def test_a_broker_that_retains_nothing_is_none_for_the_bridge(bridge, broker, fake):
-    process = begin(bridge, broker("allow_anonymous true", "retain_available false"), fake)
-    assert process.end() == 1 and "it retains nothing" in process.said()
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("retain_available false", "it retains nothing"),
+        ("max_qos 0", "it takes no messages with QoS 1"),
+        ("max_packet_size 200", "it takes no packets as large as ours"),
+    ],
+)
+def test_a_broker_that_does_not_take_what_is_published_is_none_for_the_bridge(bridge, broker, fake, limit, words):
+    process = begin(bridge, broker("allow_anonymous true", limit), fake)
+    fake.accept()
+    fake.say(STATUS)
+    assert process.end() == 1 and words in process.said()
 
 
 def test_two_bridges_of_one_name_are_told_that_there_is_another(bridge, broker, fake):
