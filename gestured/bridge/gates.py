@@ -33,7 +33,7 @@ class Gate:
     def obey(self, sensor: str, command: str) -> list[str]:
         """Carry out a command; returns the gates of the sensor that are closed now. Raises GesturedError."""
         try:
-            with Control(self._path, patience_s=ANSWER_S) as control:
+            with Control(self._path, ANSWER_S, "--gates") as control:
                 which = {"bridge": self.name, "gate": self.name, "sensor": sensor}
                 if command == OFF:
                     answer = control.ask("inhibit", **which, seconds=ALIVE_S)

@@ -17,10 +17,10 @@ ANSWER_TIMEOUT_S = 20.0  # a reload opens and tests a model; everything else tak
 class Control(Lines):
     """One connection to a control socket. Raises Unreachable if no daemon answers."""
 
-    def __init__(self, path: Path, patience_s: float = ANSWER_TIMEOUT_S) -> None:
-        """Connect to `path`; `patience_s` is how long an answer may take. Raises as `Lines`."""
-        super().__init__(path, "--control")
-        self._patience_s = patience_s
+    def __init__(self, path: Path, patience_s: float = ANSWER_TIMEOUT_S, flag: str = "--control") -> None:
+        """Connect to `path`; `patience_s` is how long an answer may take. `flag` and errors are as of `Lines`."""
+        super().__init__(path, flag)
+        self._flag, self._patience_s = flag, patience_s
         self.finished = False  # whether `finish` was called
 
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
@@ -38,7 +38,7 @@ class Control(Lines):
         if answer is None:
             raise Unreachable(f"the daemon on {self.path} closed the connection")
         if "ok" not in answer:
-            raise Refused(f"{self.path} is not the control socket; name the daemon's --control")
+            raise Refused(f"{self.path} is not the daemon's {self._flag} socket")
         if answer["ok"] is not True:
             raise Refused(f"{verb}: {answer.get('reason')}")
         return answer

@@ -269,7 +269,7 @@ def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at,
     client = known(gated, arm)
     path = Path(gated.ready["gates"])
     path.rename(path.with_suffix(".away"))
-    wait(lambda: (say(house, OFF), "armrest OFF: " in process.said())[1])
+    wait(lambda: (say(house, OFF), "start gestured, or name its --gates" in process.said())[1])
     path.with_suffix(".away").rename(path)
     say(house, OFF)
     assert client.line()["closed"] == ["mqtt"]

@@ -125,7 +125,7 @@ def test_ctrl_c_and_a_reader_that_leaves_end_it_without_a_word(start, fake: Fake
 
 def test_the_wrong_one_of_two_sockets_is_said(told, fake: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
     status, _, err = told([HELLO], "emit", "swipe_left", "--control", fake.path)  # it greets: so do event sockets
-    assert status == 1 and f"{fake.path} is not the control socket" in err
+    assert status == 1 and f"{fake.path} is not the daemon's --control socket" in err
     monkeypatch.setattr("gestured.client.subscriber.GREETING_S", 0.2)
     with pytest.raises(Unreachable, match="not its event socket"):
         next(Subscriber(fake.path, reconnect=False))  # it says nothing: so do control sockets
