@@ -464,6 +464,13 @@ def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
     assert listener.events(1)[0]["instance"] == "b"
 
 
+@pytest.mark.parametrize("ahead", [-30.0, 30.0])
+def test_a_test_says_nothing_of_the_sensors_clock_and_is_never_old(ahead: float) -> None:
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    events = [gesture(1, decided=100 + ahead), gesture(2, decided=101, test=True), gesture(3, decided=102 + ahead)]
+    assert [daemon.age(event, now) for now, event in zip((100, 101, 102), events, strict=True)] == [0.0, 0.0, 0.0]
+
+
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An authority, a broker's certificate for 127.0.0.1, and another authority."""
