@@ -52,7 +52,11 @@ class OscSlip(Protocol):
     def fits(data: bytes) -> str | None:
         """Words if the bytes are several OSC packets, else None."""
         packets = [message for each in data.split(SLIP_END)[1:-1] for message in messages_of(slip_decoded(each))]
-        return f"osc-slip with messages to {packets[0].address}" if len(packets) >= FEWEST else None
+        if len(packets) < FEWEST:
+            return None
+        address, types, args, *_ = packets[0]
+        size = sum(len(arg) if isinstance(arg, bytes | np.ndarray) else 1 for arg in args)
+        return f"osc-slip with messages to {address} of {size} numbers or bytes, type tags {types[:4]}"
 
 
 class E256(OscSlip):

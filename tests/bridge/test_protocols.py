@@ -189,8 +189,15 @@ def test_bytes_look_like_what_they_are(name: str):
     data = b"".join(written(name, frame) for frame in frames(name, 6))
     words = looks_like(data[3:])
     assert words is not None and words.startswith(name)
-    if name in ("flexitac", "csv"):
+    if not PROTOCOLS[name].fixed:
         assert str(SIZE) in words
+
+
+def test_osc_that_holds_no_frame_is_described_as_it_is():
+    doubles = looks_like(3 * slip_encoded(message("/x", *((1.0, "d") for _ in range(SIZE)))))
+    assert doubles == "osc-slip with messages to /x of 20 numbers or bytes, type tags dddd"
+    blobs = looks_like(3 * slip_encoded(message("/x", 7, bytes(162))))
+    assert blobs == "osc-slip with messages to /x of 163 numbers or bytes, type tags ib"
 
 
 def test_noise_looks_like_nothing():
