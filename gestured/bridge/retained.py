@@ -62,7 +62,10 @@ class Retained:
         wanted = {topic_of(self._host, "availability"): "online" if daemon.hello else "offline"}
         for sensor, state in daemon.states.items():
             wanted[topic_of(self._host, sensor, "state")] = state
-            wanted[topic_of(self._host, sensor, "gates")] = json.dumps(daemon.listening.get(sensor, OPEN))
+            gates = daemon.listening.get(sensor, OPEN)
+            until = gates.get("until")  # rounded, since the daemon computes it for each status from two clocks
+            told = json.dumps({**gates, "until": until and round(until, 1)})
+            wanted[topic_of(self._host, sensor, "gates")] = told
             if self._discovers and daemon.gestures:
                 found = self._discovery(sensor, daemon.gestures)
                 wanted |= {topic: json.dumps(payload) for topic, payload in found}

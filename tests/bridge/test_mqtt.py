@@ -321,6 +321,16 @@ def test_what_was_forgotten_while_the_broker_was_away_is_cleared_when_it_is_back
     assert not list(retained.changes())
 
 
+def test_a_gate_that_opens_by_itself_is_not_published_anew_each_second():
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    retained = Retained(daemon, "car", "homeassistant", discovers=False)
+    closed = {"armed": None, "closed": ["door"]}
+    daemon.take(STATUS | {"gates": {"armrest": closed | {"until": 1795871457.4070168}}})
+    assert json.loads(dict(retained.changes())["gestured/car/armrest/gates"]) == closed | {"until": 1795871457.4}
+    daemon.take(STATUS | {"gates": {"armrest": closed | {"until": 1795871457.4070173}}})  # by clocks read later
+    assert not list(retained.changes())
+
+
 def test_what_others_retain_is_neither_read_nor_cleared(bridge, broker, listen, fake):
     """Any integration may write below the discovery prefix, and as much as it likes."""
     at = broker()
