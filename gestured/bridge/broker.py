@@ -98,7 +98,8 @@ class Broker:
         if code in REFUSALS:
             raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
         if code == SILENT or "timed out" in said:
-            return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
+            never = "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
+            return never if held_s is None else "it no longer answers"
         if code != CLOSED:
             return said
         if held_s is None:

@@ -10,10 +10,12 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from gestured.bridge.broker import SILENT
 from gestured.bridge.counts import Counts
 from gestured.bridge.gates import OFF, ON, Gate
 from gestured.bridge.mqtt_session import Mqtt
@@ -194,6 +196,12 @@ def unconnected(monkeypatch: pytest.MonkeyPatch) -> Mqtt:
         gate="mqtt", discovery="homeassistant", no_discovery=True,
     )  # fmt: skip
     return Mqtt(args, Counts("mqtt"))
+
+
+def test_a_broker_that_falls_silent_is_not_taken_for_one_with_tls(monkeypatch: pytest.MonkeyPatch) -> None:
+    broker, silence = unconnected(monkeypatch)._broker, SimpleNamespace(value=SILENT)
+    assert broker.why(silence, 60.0) == "it no longer answers"
+    assert "--tls" in broker.why(silence, None)
 
 
 def test_a_command_that_comes_while_another_is_taken_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
