@@ -54,7 +54,7 @@ class Daemon:
     def __init__(self, sensors: Sequence[str] | None, gestures: Sequence[str] | None, counts: Counts) -> None:
         """`sensors` and `gestures`: the subscription's filters, None for all. `counts`: told if the daemon is there."""
         self._counts = counts
-        self.hello: Line = {}  # empty while the daemon is away
+        self.hello: Line = {}  # with each sensor's last sequence so far; empty while the daemon is away
         self.version = ""  # of the last daemon that was there
         self.states: dict[str, str] = {}  # by sensor, the latest news last; kept while the daemon is away
         self.gestures: list[str] | None = None  # None until the daemon has told them
@@ -74,6 +74,8 @@ class Daemon:
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
+            case "gesture" if self.hello and len(self.hello["sensors"]) < MOST_SENSORS:
+                self.hello = {**self.hello, "sensors": {**self.hello["sensors"], line["sensor"]: line["sequence"]}}
             case "status":
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])

@@ -159,7 +159,7 @@ class Zenoh:
         """Answer a query with the hello and last gestures that it matches; Zenoh calls this in a thread of its own."""
         hello = dict(self._daemon.hello)
         if hello:
-            known = {"gestures": self._daemon.gestures, "states": self._daemon.states}
+            known = {"gestures": self._daemon.gestures, "states": self._daemon.states, "gates": self._daemon.listening}
             self._reply(query, self._key("hello"), json.dumps(hello | known).encode())
         for sensor, data in list(self._latest.items()):
             self._reply(query, self._key(sensor, "gesture"), data)

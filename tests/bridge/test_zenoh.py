@@ -69,14 +69,17 @@ def test_latecomers_ask(bridge, site, fake):
     process = begin(bridge, site, fake)
     fake.accept()
     process.ready()
-    fake.say(gesture(1), gesture(2, "double_tap"), {"type": "gestures", "gestures": ["one_tap", "wave"]}, STATUS)
+    gates = {"armrest": {"armed": None, "closed": ["door"], "until": None}}
+    fake.say(gesture(4), gesture(5, "double_tap"), {"type": "gestures", "gestures": ["one_tap", "wave"]})
+    fake.say(STATUS | {"gates": gates})
     hello = "gestured/car/hello"
     wait(lambda: site.get(hello).get(hello, {}).get("states") == {"armrest": "ok"})
     found = site.get("gestured/*/**")
     assert found.keys() == {hello, "gestured/car/armrest/gesture"}
-    assert found["gestured/car/armrest/gesture"]["sequence"] == 2
+    assert found["gestured/car/armrest/gesture"]["sequence"] == 5
     assert found[hello]["gestures"] == ["one_tap", "wave"] and found[hello]["states"] == {"armrest": "ok"}
-    assert found[hello]["instance"] == HELLO["instance"] and found[hello]["sensors"] == HELLO["sensors"]
+    assert found[hello]["instance"] == HELLO["instance"] and found[hello]["sensors"] == {"armrest": 5}
+    assert found[hello]["gates"] == gates
 
 
 def test_a_router_that_goes_and_comes_back(bridge, site, fake):
