@@ -26,7 +26,7 @@ class Gate:
         """`path` is the daemon's socket for bridges."""
         self.name = name
         self._path, self._counts = path, counts
-        self._said = ""  # why the last command failed
+        self._said = ""  # why the last command failed, if it did
         self._due = 0.0  # monotonic s, the next repetition
         self._answered = 0.0  # s since 1970, when the daemon last carried out a command
 
@@ -44,6 +44,7 @@ class Gate:
                 closed = closed.get(sensor) if isinstance(closed, dict) else None
                 if not isinstance(closed, list) or not all(isinstance(name, str) for name in closed):
                     raise Refused(f"{self._path} does not say which gates are closed: it is not the daemon's --gates")
+                self._said = ""
                 return closed
         except GesturedError as error:
             self._counts.add("commands", "failed")
