@@ -166,8 +166,7 @@ class Serial:
             if n < first:
                 self._counts.add("frames", "overtaken")
                 continue
-            moment = time.time() if reading.moment is None else reading.moment
-            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, moment)
+            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, reading.moment)
             try:
                 heard = not sent_after_refusal(self._socket, packet)
             except OSError:  # the network is down

@@ -31,13 +31,14 @@ def bundle(*messages: OscMessage) -> OscBundle:
     return builder.build()
 
 
-def dated(moment: float, *elements: bytes) -> bytes:
-    """A bundle with the time tag `moment`, in seconds since the Unix epoch.
+def dated(moment: float | None, *elements: bytes) -> bytes:
+    """A bundle with the time tag `moment`, in seconds since the Unix epoch, or with "immediately" for None.
 
     The elements are taken as they are. python-osc would parse them, which takes longer than all else for a frame, and
     would raise an error for the nonsense of a faulty sensor on a tape.
     """
-    since_1900 = (round(moment * 2**32) + (FROM_1900_S << 32)) % 2**64  # in 2036 the count begins anew
+    # In 2036 the count begins anew.
+    since_1900 = 1 if moment is None else (round(moment * 2**32) + (FROM_1900_S << 32)) % 2**64
     return b"".join((b"#bundle\0", _tag(since_1900), *(part for one in elements for part in (_size(len(one)), one))))
 
 

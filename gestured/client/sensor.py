@@ -34,8 +34,8 @@ class Form:
     values: str = "floats"
     plain: bool = False
 
-    def packet(self, frame: Frame, counter: int, moment: float) -> bytes:
-        """The packet of a frame: pressure with the counter, and touches, in a bundle of the epoch time `moment` (s)."""
+    def packet(self, frame: Frame, counter: int, moment: float | None) -> bytes:
+        """The packet of a frame: pressure with the counter, and touches, in a bundle; for `moment` see `dated`."""
         pressure = self._pressure(frame.values, None if self.plain else counter)
         if self.plain:
             return pressure

@@ -24,10 +24,11 @@ from serial import SerialTimeoutException
 from gestured.bridge import serial
 from gestured.bridge.counts import Counts
 from gestured.bridge.serial import AGAIN_S, Serial
+from gestured.client.osc_out import dated
 from gestured.core.address import Address
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import Process, page, served, wait
-from tests.bridge.test_protocols import written
+from tests.bridge.test_protocols import message, slip_encoded, written
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
 from tests.sockets import free_address
 
@@ -179,6 +180,16 @@ def test_a_sensor_without_a_counter_gets_one_and_one_with_a_counter_keeps_it(bri
     line.say(b"\n" + ",".join(["900", *["1.5"] * 81]).encode() + b"\n")
     arrival = out.next()
     assert (arrival.values == 1.5).all() and arrival.counter == 900
+
+
+def test_a_sensor_without_a_time_of_its_own_gets_none_and_one_with_a_time_keeps_it(bridge, line, udp):
+    """The time at which the bridge reads a frame is later than its own when this host was slow."""
+    out = Out(udp)
+    begin(bridge, line, "osc-slip", udp)
+    line.say(written("osc-slip", frame(1)))
+    assert out.next().timetag is None
+    line.say(slip_encoded(dated(1000.5, message("/x", *map(float, range(81))))))
+    assert out.next().timetag == 1000.5
 
 
 def test_a_slow_host_gets_the_latest_frames(bridge, line, udp):

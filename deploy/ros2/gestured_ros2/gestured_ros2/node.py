@@ -186,7 +186,7 @@ class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
                 return
             counter = (counter + 1) & 0x7FFFFFFF
             stamp = image.header.stamp
-            moment = stamp.sec + 1e-9 * stamp.nanosec or time.time()
+            moment = stamp.sec + 1e-9 * stamp.nanosec or None
             try:
                 heard = not sent_after_refusal(udp, form.packet(Frame(0.0, values), counter, moment))
             except OSError:  # the network is down, or its queue is full
