@@ -97,14 +97,14 @@ class Broker:
             )
         if code in REFUSALS:
             raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
+        other = "is it one without TLS, or does it ask for a --cert that it knows?"
+        hint = "is it one with TLS: --tls?" if self._tls is None else other
         if code == SILENT or "timed out" in said:
-            never = "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
-            return never if held_s is None else "it no longer answers"
-        if code != CLOSED:
+            return f"it does not answer as an MQTT broker does ({hint})" if held_s is None else "it no longer answers"
+        if code != CLOSED and not isinstance(error, ConnectionResetError | ssl.SSLEOFError):
             return said
         if held_s is None:
-            asks = "is it one with TLS: --tls?" if self._tls is None else "does it ask for a --cert that it knows?"
-            return f"it closed the connection before it let us in ({asks})"
+            return f"it closed the connection before it let us in ({hint})"
         who = f" at once: does another bridge have the name gestured-{self._host}? (--host)"
         return f"it closed the connection{who if held_s < LONGEST_S else ''}"
 

@@ -530,6 +530,10 @@ def test_a_broker_that_wants_a_certificate_says_so(bridge, broker, fake, certifi
     process.until("does it ask for a --cert that it knows?")
 
 
+def test_a_broker_without_tls_is_told_from_one_that_is_not_there(bridge, broker, fake):
+    begin(bridge, broker(), fake, "--tls").until("closed the connection before it let us in (is it one without TLS")
+
+
 def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, fake, tmp_path: Path):
     access = "user car\ntopic write gestured/car/#\ntopic write homeassistant/+/gestured_car/#\n"
     at = broker(*guarded(tmp_path, "car:secret\n", access))
