@@ -81,7 +81,9 @@ def parser() -> Parser:
     adapt = add("adapt", "train a shipped model further with recordings of your own, and print what that is worth; "
                 "writes nothing, with exit status 1, unless it is better",
                 "gestured-lab adapt recordings/*.npz --out my.onnx")  # fmt: skip
-    adapt.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="recordings of your own (.npz)")
+    adapt.add_argument("recordings", type=Path, nargs="+", metavar="FILE",
+                       help="recordings of your own (.npz), and perhaps tapes in which nobody made a gesture (.mcap): "
+                            "with tapes, the model learns to be silent")  # fmt: skip
     adapt.add_argument("--out", type=Path, required=True, metavar="MODEL", help="a new file for the model (*.onnx)")
     adapt.add_argument(
         "--base", default="cnn_lstm", metavar="MODEL", help="cnn_lstm, lstm, or a file (default: cnn_lstm)"
@@ -98,7 +100,7 @@ def parser() -> Parser:
         type=number(1, 10_000, whole=True),
         default=200,
         metavar="N",
-        help="training steps for each held-out group (default: 200)",
+        help="training steps for each held-out group, without tapes (default: 200)",
     )
     evaluate = add("evaluate", "print the accuracy of models on people that they have not learned from; "
                    "writes cards and manifest",

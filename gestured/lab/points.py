@@ -23,10 +23,13 @@ from gestured.simulator import GESTURES, NONE
 COSTS = dict(zip(STRICTNESS, (0.1, 0.25, 3.0), strict=True))
 
 
-def operating_points(answers: Answers, lived: Samples, performed: int, hours: float) -> dict[str, Any]:
+def operating_points(
+    answers: Answers, lived: Samples, performed: int, hours: float, false_weight: float = 1.0
+) -> dict[str, Any]:
     """The metadata `operating_points`, by answers to (G,) segments of so many `hours` with `performed` gestures.
 
-    A gesture that was performed and never cut out is missed at every point.
+    A gesture that was performed and never cut out is missed at every point. `false_weight`: how much more a false
+    gesture of these hours weighs than COSTS says, where they do not hold as many gestures as a day does.
     """
     best, sure = answers[0].argmax(axis=1), confidence(answers)
     label = targets(lived)
@@ -37,7 +40,7 @@ def operating_points(answers: Answers, lived: Samples, performed: int, hours: fl
     groups = alike()
     found: dict[str, Any] = {}
     for name in STRICTNESS:
-        worth = rightly - WRONG * wrongly - COSTS[name] * falsely
+        worth = rightly - WRONG * wrongly - COSTS[name] * false_weight * falsely
         level = np.array([int(worth[group].sum(axis=0).argmax()) for group in groups])
         of = np.arange(len(GESTURES)), level
         found[name] = {

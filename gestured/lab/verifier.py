@@ -5,6 +5,7 @@ the networks have not learned. It learns about context only from sessions in whi
 a take of one performance is given the past of some segment of such a session, so that its own past teaches nothing.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -91,10 +92,16 @@ def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.floa
     return context
 
 
-def fit_verifier(decision: Decision, parts: Sequence[tuple[Evidence, NDArray[np.int64]]], seed: int) -> Verifier:
+def fit_verifier(
+    decision: Decision,
+    parts: Sequence[tuple[Evidence, NDArray[np.int64]]],
+    seed: int,
+    old: Verifier | None = None,
+) -> Verifier:
     """Fit a verifier to parts of (evidence, class of each segment as `taught` gives it).
 
-    Each of the three classes has its weight as a whole, however many segments it has.
+    Each of the three classes has its weight as a whole, however many segments it has. The first weights are those of
+    the `old` verifier, if there is one.
     """
     y = torch.from_numpy(np.concatenate([kind for _, kind in parts]))
     with torch.no_grad():
@@ -104,8 +111,10 @@ def fit_verifier(decision: Decision, parts: Sequence[tuple[Evidence, NDArray[np.
     counts = torch.bincount(y[usable], minlength=3).clamp(min=1)
     weight = torch.tensor([1.0, EVERYDAY_COST, OTHERS_COST]) / counts * len(usable)
     torch.manual_seed(seed)
-    verifier = Verifier(cues.shape[1], embedding.shape[1], context.shape[1])
-    verifier.fit_scale(torch.cat([cues, embedding, context], 1)[usable])
+    verifier = copy.deepcopy(old)
+    if verifier is None:
+        verifier = Verifier(cues.shape[1], embedding.shape[1], context.shape[1])
+        verifier.fit_scale(torch.cat([cues, embedding, context], 1)[usable])
     optimiser = torch.optim.AdamW(verifier.parameters(), lr=RATE, weight_decay=DECAY)
     steps = EPOCHS * -(-len(usable) // BATCH)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, total_steps=steps, pct_start=0.1)

@@ -124,6 +124,22 @@ class Adapted:
     provisional: Mapping[str, Any]  # the rule for provisional events
     before: Shares
     after: Shares
+    points: None = None  # the metadata `operating_points`: a model that was adapted to recordings alone has none
+
+    @property
+    def judged(self) -> Judged:
+        """The networks, their decision and their verifier."""
+        return self.new.judged
+
+    @property
+    def least(self) -> float:
+        """The confidence from which an answer is published."""
+        return self.new.least
+
+    def answered(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """(N,) the confidence of each answer to people who were held out, and whether they performed a gesture."""
+        cut = self.new.answers.confidence >= 0
+        return self.new.answers.confidence[cut], self.new.answers.known[cut]
 
     def reasons(self) -> list[str]:
         """Why the new model is no better than the old one; empty if it is."""

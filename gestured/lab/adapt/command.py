@@ -1,4 +1,7 @@
-"""`gestured-lab adapt`: writes an adapted model, or says why it is no better."""
+"""`gestured-lab adapt`: writes an adapted model, or says why it is no better.
+
+With tapes of hours in which nobody made a gesture among the recordings, the model learns to be silent (`silence`).
+"""
 
 import argparse
 import hashlib
@@ -6,6 +9,7 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,14 +18,16 @@ import torch
 
 from gestured.client.say import say, say_json
 from gestured.core.errors import GesturedError
-from gestured.lab.adapt.adaptation import Adapted, Shares, adapt
+from gestured.lab.adapt.adaptation import Adapted, Interval, Shares, adapt
 from gestured.lab.adapt.learning import Course, simulate
 from gestured.lab.adapt.material import Own, own_recordings
+from gestured.lab.adapt.silence import Quieter, own_hours, quieter
 from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
 from gestured.lab.own.learn import PEOPLE, teach
+from gestured.lab.points import by_strictness
 from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.samples import WINDOW, Samples
@@ -54,31 +60,38 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--out: {out} is a shipped model, which stays as it is; give the new one another name")
     torch.set_num_threads(1)  # networks this small are slower on two threads, above all on a busy machine
     base = base_of(args.base)
-    own = own_recordings(args.recordings, args.as_none)
+    recordings = [path for path in args.recordings if path.suffix == ".npz"]
+    tapes = [path for path in args.recordings if path.suffix != ".npz"]
+    if not recordings:
+        raise GesturedError(f"{tapes[0]}: expected recordings of gestures (.npz) beside tapes in which nobody made one")
+    own = own_recordings(recordings, args.as_none)
+    lived = own_hours(tapes, own.grid) if tapes else None
     learned_from = _learned_from(base, args.recordings)
     cache = args.cache or cache_folder()
     cache.mkdir(parents=True, exist_ok=True)
     takes = simulate(cache, JOBS)
-    found = adapt(base, own, takes, Course(steps=args.steps))
+    found = adapt(base, own, takes, Course(steps=args.steps)) if lived is None else quieter(base, own, lived, takes)
     reasons = found.reasons()
     written = not reasons or args.force
     if not args.json:
-        _tell(own, found)
+        _tell_hours(own, found) if isinstance(found, Quieter) else _tell(own, found)
     if written:
-        _write(found, out, _facts(base, own, found, takes.teach, learned_from), cache)
+        others = [takes.teach] if lived is None else [lived.samples, takes.teach]
+        _write(found, out, _facts(base, own, found, others, learned_from), cache)
     if args.json:
-        say_json(_figures(own, found) | {"written": str(out) if written else None, "reasons": reasons})
+        told = _hours(own, found) if isinstance(found, Quieter) else _figures(own, found)
+        say_json(told | {"written": str(out) if written else None, "reasons": reasons})
     else:
         why = f": {'; '.join(reasons)}" if reasons else ""
         say(f"{out}: {'written' if written else 'not written'}{why}", to=sys.stdout if written else sys.stderr)
     return 0 if written else 1
 
 
-def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
+def _write(found: Adapted | Quieter, out: Path, facts: Facts, cache: Path) -> None:
     """Write the model, whole or not at all; what own gestures need is learned anew, since it depends on the weights."""
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / out.name
-        export_net(found.new.judged, made, facts)
+        export_net(found.judged, made, facts)
         teach(made, cache, PEOPLE, JOBS)
         write(out, made.read_bytes())
 
@@ -95,21 +108,23 @@ def _learned_from(base: Base, recordings: list[Path]) -> list[dict[str, Any]]:
     return [*before, *new]
 
 
-def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, learned_from: list[dict[str, Any]]) -> Facts:
-    """The facts that the new file holds."""
-    new, gestures = found.new, own.samples.take(own.samples.labels != NONE)
-    cut = new.answers.confidence >= 0
-    learned = base.model.metadata.training_data + own.samples.digest() + simulated.digest()
+def _facts(
+    base: Base, own: Own, found: Adapted | Quieter, others: Sequence[Samples], learned_from: list[dict[str, Any]]
+) -> Facts:
+    """The facts that the new file holds, of a model that has learned from own and other samples."""
+    gestures = own.samples.take(own.samples.labels != NONE)
+    learned = base.model.metadata.training_data + "".join(samples.digest() for samples in (own.samples, *others))
     return Facts(
         kind=base.kind,
         version=base.model.metadata.version,
         gestures=list(GESTURES),
         window=WINDOW,
-        calibration=calibration_of(new.judged.decision, new.least),
+        calibration=calibration_of(found.judged.decision, found.least),
         training_data=hashlib.sha256(learned.encode()).hexdigest(),
-        quantiles=quantiles(gestures) | answer_figures(new.answers.confidence[cut], new.answers.known[cut], new.least),
+        quantiles=quantiles(gestures) | answer_figures(*found.answered(), found.least),
         classes=CLASSES,
         context=base.model.metadata.context,
+        operating_points=found.points,
         provisional=found.provisional,
         learned_from=learned_from,
     )
@@ -143,8 +158,36 @@ def _tell(own: Own, found: Adapted) -> None:
     )
 
 
+def _hours(own: Own, found: Quieter) -> dict[str, Any]:
+    return {
+        "people": len(own.names),
+        "hours": round(found.hours, 3),
+        "held_out": {"recordings": found.unit, "tapes": found.lived.unit},
+        "left_out": own.left_out,
+        "before": found.before.as_dict(),
+        "before_as_many_right": found.moved.as_dict(),
+        "after": found.after.as_dict(),
+        "points": found.points,
+    }
+
+
+def _tell_hours(own: Own, found: Quieter) -> None:
+    say(f"{len(own.names)} people, {own.performed} gestures; {found.hours:.1f} h, {len(found.lived.samples)} contacts")
+    say(f"{'':<22}{'false an hour':>20}{'right':>18}{'wrong':>18}")
+    rows = ("as it was", found.before), ("as many right", found.moved), ("adapted, as many", found.after)
+    for title, cost in rows:
+        low, high = cost.false[1:]
+        cells = f"{cost.false[0]:.2f} {low:.1f}-{high:.1f}", *map(_share, (cost.right, cost.wrong))
+        say(f"{title:<22}{cells[0]:>20}{cells[1]:>18}{cells[2]:>18}")
+    say(f"held out in turn: {found.unit} of the recordings, {found.lived.unit}; one threshold, for as many right ones")
+    say("operating points, chosen on the answers to what was held out:", *by_strictness(found.points).splitlines())
+
+
+def _share(of: Interval) -> str:
+    share, low, high = of
+    return f"{share:.3f} {low:.2f}-{high:.2f}" if share == share else "-"
+
+
 def _row(title: str, shares: Shares) -> str:
-    cells = []
-    for share, low, high in (shares.right, shares.wrong, shares.unknown, shares.accepted):
-        cells.append(f"{share:.3f} {low:.2f}-{high:.2f}" if share == share else "-")
+    cells = map(_share, (shares.right, shares.wrong, shares.unknown, shares.accepted))
     return f"{title:<16}" + "".join(f"{cell:>16}" for cell in cells)

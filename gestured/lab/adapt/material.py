@@ -36,6 +36,7 @@ class Own:
     names: tuple[str, ...]  # pseudonyms
     missed: NDArray[np.int64]  # (M, 2) person and sitting of each missed gesture
     left_out: dict[str, int]  # how often each name that the model does not know was performed
+    grid: tuple[int, ...] = ()  # rows and columns of the frames
 
     @property
     def performed(self) -> int:
@@ -75,6 +76,7 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
         tuple(names),
         np.array(missed, np.int64).reshape(-1, 2),
         dict(left),
+        grid or (),
     )
     if own.performed < FEWEST:
         others = "; names of your own are enrolled, not learned: " + ", ".join(sorted(left)) if left else ""
@@ -111,7 +113,7 @@ def held_out(own: Own) -> Groups:
     for units, lost, name in owners:
         different, counts = np.unique(units, return_counts=True)
         if len(different) >= 2:
-            group_of = _dealt(different, counts)
+            group_of = dealt(different, counts)
             of_samples = np.array([group_of[unit] for unit in units.tolist()], np.int64)
             return Groups(name, of_samples, units, lost)
     count = min(GROUPS, len(own.samples))
@@ -119,7 +121,7 @@ def held_out(own: Own) -> Groups:
     return Groups("parts of one session", stretch, stretch, np.arange(len(own.missed)) % count)
 
 
-def _dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int]:
+def dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int]:
     """The group of each unit; the largest units come first, each goes into the group that is smallest by then."""
     size = [0] * min(GROUPS, len(units))
     found = {}

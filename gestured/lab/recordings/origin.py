@@ -24,11 +24,13 @@ class Origin:
 
 
 def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
-    """The metadata `learned_from` about these files. Raises RecordingError for a file that holds no recordings."""
+    """The metadata `learned_from` about these files; a tape names no subjects. Raises RecordingError as `read` does."""
     return [asdict(_origin(path)) for path in paths]
 
 
 def _origin(path: Path) -> Origin:
+    if path.suffix != ".npz":
+        return Origin(path.name, file_digest(path), [])
     found = read(path)
     subjects = found.subjects.astype(str).tolist()
     days: dict[str, str] = {}

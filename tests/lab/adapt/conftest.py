@@ -1,18 +1,25 @@
 """A small simulated world in place of the thousands of takes that `adapt` cuts, and a trained model to start from."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from gestured.lab.adapt import command
 from gestured.lab.adapt.learning import Simulated
 from gestured.lab.adapt.weights import untrained
+from gestured.lab.cli import main
 from gestured.lab.dataset import from_take
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
+from gestured.lab.own import learn as own
 from gestured.lab.samples import WINDOW, Samples, collect
 from gestured.simulator import GESTURES, wide
+from tests.lab.test_own import drawn
+
+Run = Callable[..., tuple[int, str, str]]
 
 
 def some(seed: int, count: int) -> Samples:
@@ -36,3 +43,25 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )  # fmt: skip
     export_net(untrained("cnn_lstm"), path, facts)
     return path
+
+
+@pytest.fixture
+def little(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is simulated is made once for all tests, and little."""
+    monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
+    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
+    monkeypatch.setattr(own, "FOLDS", 2)
+
+
+@pytest.fixture
+def run(
+    little: None, base: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Run:
+    """Run `adapt` in a folder of its own; gives the exit status, and what it printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def adapt(*arguments: object) -> tuple[int, str, str]:
+        status = main(["adapt", "--base", str(base), *map(str, arguments)])
+        return status, *capsys.readouterr()
+
+    return adapt

@@ -5,7 +5,6 @@ import errno
 import json
 import re
 import shlex
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.cli import main
-from gestured.lab.own import learn as own
 from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import KEY, origins, said
 from gestured.model.opening import open_model
@@ -25,35 +23,9 @@ from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
+from tests.lab.adapt.conftest import Run
 from tests.lab.adapt.recorded import CONSENT, cut_gestures, unknown_sensor, whole_session
 from tests.lab.test_own import drawn
-
-Run = Callable[..., tuple[int, str, str]]
-
-
-def small_world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is simulated is made once for all tests, and little."""
-    monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
-    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
-    monkeypatch.setattr(own, "FOLDS", 2)
-
-
-@pytest.fixture
-def run(
-    request: pytest.FixtureRequest,
-    base: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> Run:
-    small_world(request, monkeypatch)
-    monkeypatch.chdir(tmp_path)
-
-    def adapt(*arguments: object) -> tuple[int, str, str]:
-        status = main(["adapt", "--base", str(base), *map(str, arguments)])
-        return status, *capsys.readouterr()
-
-    return adapt
 
 
 def sluggish(tmp_path: Path) -> Path:
@@ -93,11 +65,11 @@ def test_a_model_that_is_written_says_whom_it_learned_from(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("little")
 def test_the_document_leads_to_a_model(
     tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What docs/own-sensor.md does with recordings runs, in its order; the model still learns gestures of one's own."""
-    small_world(request, monkeypatch)
     monkeypatch.chdir(tmp_path)
     Path("recordings").mkdir()
     for k, name in enumerate(("07", "08")):
