@@ -17,6 +17,7 @@ from typing import Any
 import torch
 
 from gestured.client.say import say, say_json
+from gestured.client.values import each_once
 from gestured.core.errors import GesturedError
 from gestured.lab.adapt.adaptation import Adapted, Interval, Shares, adapt
 from gestured.lab.adapt.learning import Course, simulate
@@ -64,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     tapes = [path for path in args.recordings if path.suffix != ".npz"]
     if not recordings:
         raise GesturedError(f"{tapes[0]}: expected recordings of gestures (.npz) beside tapes in which nobody made one")
+    each_once(tapes)
     own = own_recordings(recordings, args.as_none)
     lived = own_hours(tapes, own.grid) if tapes else None
     learned_from = _learned_from(base, args.recordings)
