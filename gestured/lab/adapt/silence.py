@@ -2,8 +2,8 @@
 
 The networks stay as they are. The verifier, which decides whether a gesture was meant, learns further: all contacts of
 the tapes were not meant, and all gestures of the recordings were. A gesture in a recording session follows a pause, so
-each of them is given the past of some contact of the tapes. As many simulated gestures keep what the verifier knows of
-those that the recordings lack.
+each of them is given the past of some contact of the tapes. Gestures that the recordings lack are simulated, so that
+they are not forgotten; more simulated ones would only blur what this sensor and these people show.
 
 People and tapes are held out in turn, and each is judged by a verifier that has not learned from it. Both models are
 compared at thresholds at which as many gestures are right. The model that is written has learned from all; its
@@ -40,6 +40,7 @@ from gestured.lab.verifier import Evidence, fit_verifier, taught, with_past_of
 from gestured.simulator import GESTURES, NONE
 
 LEAST_HOURS = 1.0  # of tapes; fewer hardly show what people do besides gestures
+ENOUGH = 5  # performances of a gesture that need no simulated ones beside them
 AN_HOUR = 35.0  # gestures, in the hours for which the costs of false gestures were chosen (`points.COSTS`)
 
 
@@ -198,12 +199,15 @@ def quieter(base: Base, own: Own, lived: Lived, takes: Simulated) -> Quieter:
          opinions(base.judged, lived.samples)]
     )  # fmt: skip
     kinds = taught(heard.samples)
-    simulated = _some(takes.teach, int((kinds == 0).sum()))
-    made = opinions(base.judged, simulated).beside(with_past_of(simulated, lived.samples, 2)), taught(simulated)
+    lacking = _lacking(own.samples, takes.teach)
+    made = []
+    if len(lacking):
+        past = with_past_of(lacking, lived.samples, 2)
+        made.append((opinions(base.judged, lacking).beside(past), taught(lacking)))
 
     def learned(rows: NDArray[np.bool_]) -> Verifier:
         mine = evidence.take(from_numpy(rows)), kinds[rows]
-        return fit_verifier(base.judged.decision, [mine, made], 1, old)
+        return fit_verifier(base.judged.decision, [mine, *made], 1, old)
 
     said = evidence.answers(base.judged.decision, old)
     scores, unknown = said[0].copy(), said[1].copy()
@@ -233,8 +237,11 @@ def _least(answers: decide.Answers, least: Least) -> NDArray[np.float64]:
     return np.asarray(of[answers[0].argmax(axis=1)])
 
 
-def _some(takes: Samples, count: int) -> Samples:
-    """So many simulated gestures, drawn at random, and all non-gestures."""
-    gestures = np.flatnonzero(takes.labels != NONE)
-    chosen = np.random.default_rng(1).permutation(gestures)[:count]
-    return takes.take(np.sort(np.concatenate([chosen, np.flatnonzero(takes.labels == NONE)])))
+def _lacking(own: Samples, takes: Samples) -> Samples:
+    """Simulated performances of each gesture that was hardly recorded, as many as of the others on average."""
+    count = {name: int((own.labels == name).sum()) for name in GESTURES}
+    there = [n for n in count.values() if n >= ENOUGH]
+    most = round(sum(there) / len(there)) if there else ENOUGH
+    lacking = [name for name in GESTURES if count[name] < ENOUGH]
+    rows = [np.flatnonzero(takes.labels == name)[:most] for name in lacking]
+    return takes.take(np.concatenate([np.zeros(0, np.int64), *rows]))
