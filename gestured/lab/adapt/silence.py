@@ -82,18 +82,16 @@ def own_hours(paths: Sequence[Path], grid: tuple[int, ...]) -> Lived:
 
 
 def _contacts(life: Stretch) -> tuple[list[Sample], NDArray[np.float64], float]:
-    """The contacts of a stretch, their onsets in s since its first frame, and its length in s without silences."""
+    """The contacts of a stretch, their onsets in s since its first frame, and its length in s, without silences."""
     assert life.setup.grid is not None
     front = FrontEnd(*life.setup.grid, mounting=life.setup.mounting, timing=Timing(tap_gap_s=life.tap_gap_s))
-    segments, first, last, absent = [], None, 0.0, 0.0
+    segments, times = [], []
     for frame in life.frames:
-        first, last = (frame.t, frame.t) if first is None else (first, last)
-        absent += max(frame.t - last - ABSENT_S, 0.0)
-        last = frame.t
+        times.append(frame.t)
         segments += [found.segment for found in front.push(frame) if isinstance(found, Cut)]
-    begin = first or 0.0
-    onsets = np.array([segment.onset - begin for segment in segments])
-    return [sample(segment, NONE, EVERYDAY, 0) for segment in segments], onsets, last - begin - absent
+    heard = np.cumsum(np.minimum(np.diff(times, prepend=times[:1]), ABSENT_S))
+    onsets = np.interp([segment.onset for segment in segments], times, heard) if segments else np.zeros(0)
+    return [sample(segment, NONE, EVERYDAY, 0) for segment in segments], onsets, float(heard[-1]) if times else 0.0
 
 
 class Cost(NamedTuple):

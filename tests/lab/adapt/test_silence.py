@@ -21,13 +21,14 @@ from tests.lab.adapt.recorded import cut_gestures
 TAUGHT = [name for name in GESTURES if name != "swipe_up"]
 
 
-def tape(path: Path, kinds: Sequence[str], grid: Sequence[int] = (9, 9), seed: int = 0) -> Path:
-    """A tape of a sensor on which these kinds happened, one after the other."""
+def tape(path: Path, kinds: Sequence[str], grid: Sequence[int] = (9, 9), seed: int = 0, silence_s: float = 0.0) -> Path:
+    """A tape of a sensor on which these kinds happened, one after the other; it is silent before the last half."""
     settings = {"model": "cnn_lstm", "fallback": [], "grid": list(grid), "sensors": {}}
     told = {"settings": settings, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
     sensor, form, now, n = SimulatedSensor.nominal(day=70), Form("arm"), 1.0, 0
     with Writer(path, told, 1 << 28) as writer:
         for k, kind in enumerate(kinds):
+            now += silence_s if k == len(kinds) // 2 else 0.0
             take = gesture_take(kind, Participant(600 + seed), sensor, generator(32, seed, k))
             for frame, t in zip(take.frames, take.times - take.times[0] + 1 / 15, strict=True):
                 packet = form.packet(Frame(0.0, frame[: grid[0], : grid[1]]), n, 0.0)
@@ -93,7 +94,9 @@ def test_what_no_silence_can_be_learned_from_is_one_sentence(
 
 
 @pytest.mark.usefixtures("short")
-def test_a_single_tape_is_held_out_in_parts(tmp_path: Path) -> None:
-    lived = silence.own_hours([tape(tmp_path / "day.mcap", ["one_tap"] * 24)], (9, 9))
+@pytest.mark.parametrize("silence_s", [0.0, 3600.0])
+def test_a_single_tape_is_held_out_in_parts(silence_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(silence, "ABSENT_S", 1.0)  # what a silence counts for, on a tape of a minute
+    lived = silence.own_hours([tape(tmp_path / "day.mcap", ["one_tap"] * 24, silence_s=silence_s)], (9, 9))
     assert lived.unit == "parts of one tape" and len(lived.hours) == 5
     assert np.ptp(lived.hours) == 0 and np.bincount(lived.samples.people, minlength=5).min() >= 4
