@@ -1,4 +1,4 @@
-"""The values on a command line, for argparse's `type`: each is read, or refused in one sentence."""
+"""The values on a command line, most of them for argparse's `type`: each is read, or refused in one sentence."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterable, Sequence

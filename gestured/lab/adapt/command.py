@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"{tapes[0]}: expected recordings of gestures (.npz) beside tapes in which nobody made one")
     each_once(tapes)
     own = own_recordings(recordings, args.as_none)
-    lived = own_hours(tapes, own.grid) if tapes else None
     learned_from = _learned_from(base, args.recordings)
+    lived = own_hours(tapes, own.grid) if tapes else None
     cache = args.cache or cache_folder()
     cache.mkdir(parents=True, exist_ok=True)
     takes = simulate(cache, JOBS)
@@ -102,7 +102,7 @@ def _learned_from(base: Base, recordings: list[Path]) -> list[dict[str, Any]]:
     """All that the new model learns from. Raises GesturedError if its base has learned from the same recordings."""
     before, new = json.loads(base.model.properties.get(KEY, "[]")), origins(recordings)
     for old, one in product(before, new):
-        if old["sha256"] == one["sha256"] or old["consents"].items() & one["consents"].items():
+        if old["sha256"] == one["sha256"] or old.get("consents", {}).items() & one["consents"].items():
             raise GesturedError(
                 f"--base: {base.model.name} has learned from {old['file']}, so that nobody in {one['file']} can be "
                 "held out; expected the model that it was made of, and all recordings"
@@ -176,12 +176,13 @@ def _hours(own: Own, found: Quieter) -> dict[str, Any]:
 def _tell_hours(own: Own, found: Quieter) -> None:
     say(f"{len(own.names)} people, {own.performed} gestures; {found.hours:.1f} h, {len(found.lived.samples)} contacts")
     say(f"{'':<22}{'false an hour':>20}{'right':>18}{'wrong':>18}")
-    rows = ("as it was", found.before), ("as many right", found.moved), ("adapted, as many", found.after)
+    rows = ("as it was", found.before), ("one threshold", found.moved), ("adapted", found.after)
     for title, cost in rows:
         low, high = cost.false[1:]
         cells = f"{cost.false[0]:.2f} {low:.1f}-{high:.1f}", *map(_share, (cost.right, cost.wrong))
         say(f"{title:<22}{cells[0]:>20}{cells[1]:>18}{cells[2]:>18}")
-    say(f"held out in turn: {found.unit} of the recordings, {found.lived.unit}; one threshold, for as many right ones")
+    say("the last two rows: with one threshold for all gestures, at which as many are right as in the first")
+    say(f"held out in turn: {found.unit} of the recordings, {found.lived.unit}")
     say("operating points, chosen on the answers to what was held out:", *by_strictness(found.points).splitlines())
 
 

@@ -177,10 +177,9 @@ class Quieter:
     def reasons(self) -> list[str]:
         """Why the new model is no better than the old one; empty if it is."""
         found = []
-        if not self.after.false[0] < self.moved.false[0]:
-            found.append(
-                f"false gestures do not go down ({self.moved.false[0]:.2f} -> {self.after.false[0]:.2f} an hour)"
-            )
+        old, new = min(self.before.false[0], self.moved.false[0]), self.after.false[0]
+        if not new < old:
+            found.append(f"false gestures do not go down ({old:.2f} -> {new:.2f} an hour)")
         if self.after.right[0] < self.before.right[0]:
             found.append(f"right goes down ({self.before.right[0]:.3f} -> {self.after.right[0]:.3f})")
         return found

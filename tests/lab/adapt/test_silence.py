@@ -93,6 +93,19 @@ def test_what_no_silence_can_be_learned_from_is_one_sentence(
     assert not (tmp_path / "my.onnx").exists()
 
 
+def test_a_model_that_says_more_than_the_one_in_use_is_no_better() -> None:
+    def cost(false: float) -> silence.Cost:
+        return silence.Cost((false, 0.0, 1.0), (0.8, 0.0, 1.0), (0.0, 0.0, 1.0))
+
+    def reasons(before: float, moved: float, after: float) -> list[str]:
+        held = dict.fromkeys(("judged", "points", "provisional", "lived", "known", "confidence"), None)
+        costs = {"before": cost(before), "moved": cost(moved), "after": cost(after)}
+        return silence.Quieter(least=0.5, unit="people", **held, **costs).reasons()  # type: ignore[arg-type]
+
+    assert reasons(18.0, 22.0, 20.0) == ["false gestures do not go down (18.00 -> 20.00 an hour)"]
+    assert reasons(22.0, 18.0, 20.0) and not reasons(18.0, 22.0, 7.0)
+
+
 @pytest.mark.usefixtures("short")
 @pytest.mark.parametrize("silence_s", [0.0, 3600.0])
 def test_a_single_tape_is_held_out_in_parts(silence_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
