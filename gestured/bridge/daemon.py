@@ -74,8 +74,10 @@ class Daemon:
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
-            case "gesture" if self.hello and len(self.hello["sensors"]) < MOST_SENSORS:
-                self.hello = {**self.hello, "sensors": {**self.hello["sensors"], line["sensor"]: line["sequence"]}}
+            case "gesture" if self.hello:
+                sequences = self.hello["sensors"]
+                if line["sensor"] in sequences or len(sequences) < MOST_SENSORS:
+                    self.hello = {**self.hello, "sensors": {**sequences, line["sensor"]: line["sequence"]}}
             case "status":
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])

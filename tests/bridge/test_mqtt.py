@@ -416,6 +416,15 @@ def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch)
     assert daemon.states == {"invented8": "no_data", "armrest": "ok", "invented9": "ok"}
 
 
+def test_sequences_go_on_where_there_are_as_many_sensors_as_are_remembered(monkeypatch):
+    monkeypatch.setattr(known, "MOST_SENSORS", 2)
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    daemon.take(HELLO | {"sensors": {"armrest": 1, "door": 1}})
+    for name in ("armrest", "invented"):
+        daemon.take({"type": "gesture", "sensor": name, "sequence": 7})
+    assert daemon.hello["sensors"] == {"armrest": 7, "door": 1}
+
+
 def test_a_sensor_that_a_restarted_daemon_does_not_know_is_silent(bridge, broker, listen, fake):
     at = broker()
     started(bridge, at, fake)
