@@ -148,8 +148,7 @@ def _figures(own: Own, found: Adapted) -> dict[str, Any]:
 def _tell(own: Own, found: Adapted) -> None:
     new, shares = found.new, found.new.before
     say(f"{len(own.names)} people, {shares.gestures} gestures, {shares.others} non-gestures")
-    for name, count in sorted(own.left_out.items()):
-        say(f"left out: {name} ({count}), neither taught nor rejected, so that it can be enrolled")
+    _tell_left_out(own)
     say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
     for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
@@ -158,6 +157,11 @@ def _tell(own: Own, found: Adapted) -> None:
         "the model has no operating points: every strictness takes this threshold, which may be laxer than normal was",
         "(gestured-lab everyday counts what is false, gesturectl tune proposes other thresholds)",
     )
+
+
+def _tell_left_out(own: Own) -> None:
+    for name, count in sorted(own.left_out.items()):
+        say(f"left out: {name} ({count}), neither taught nor rejected, so that it can be enrolled")
 
 
 def _hours(own: Own, found: Quieter) -> dict[str, Any]:
@@ -174,7 +178,9 @@ def _hours(own: Own, found: Quieter) -> dict[str, Any]:
 
 
 def _tell_hours(own: Own, found: Quieter) -> None:
-    say(f"{len(own.names)} people, {own.performed} gestures; {found.hours:.1f} h, {len(found.lived.samples)} contacts")
+    contacts = f"{found.hours:.1f} h of tapes with {len(found.lived.samples)} contacts"
+    say(f"{len(own.names)} people, {own.performed} gestures; {contacts}")
+    _tell_left_out(own)
     say(f"{'':<22}{'false an hour':>20}{'right':>18}{'wrong':>18}")
     rows = ("as it was", found.before), ("one threshold", found.moved), ("adapted", found.after)
     for title, cost in rows:

@@ -50,7 +50,7 @@ class Lived:
 
     samples: Samples  # of the kind EVERYDAY; `people` are places in `hours`
     hours: NDArray[np.float64]  # (U,) h, of each tape and sensor; with only one, of equal parts of it
-    unit: str  # what each of them is
+    unit: str  # what each of these hours is of: "tapes", or "parts of one tape"
 
 
 def own_hours(paths: Sequence[Path], grid: tuple[int, ...]) -> Lived:
@@ -82,7 +82,7 @@ def own_hours(paths: Sequence[Path], grid: tuple[int, ...]) -> Lived:
 
 
 def _contacts(life: Stretch) -> tuple[list[Sample], NDArray[np.float64], float]:
-    """The contacts of a stretch, their onsets in s since its first frame, and its length in s, without silences."""
+    """The contacts of a stretch, their onsets in s since its first frame, and its length in s, without its silences."""
     assert life.setup.grid is not None
     front = FrontEnd(*life.setup.grid, mounting=life.setup.mounting, timing=Timing(tap_gap_s=life.tap_gap_s))
     segments, times = [], []
@@ -95,7 +95,7 @@ def _contacts(life: Stretch) -> tuple[list[Sample], NDArray[np.float64], float]:
 
 
 class Cost(NamedTuple):
-    """What a model says to people and hours that it does not know; each with the ends of its 95 % interval."""
+    """What a model answers where it has not learned; each figure with the ends of its 95 % interval."""
 
     false: tuple[float, float, float]  # false gestures an hour
     right: tuple[float, float, float]  # shares of the gestures that were performed
@@ -132,7 +132,7 @@ class _Heard:
         return np.asarray(self._known & (answers[0].argmax(axis=1) == self._of))
 
     def alike(self, answers: decide.Answers, count: int) -> Cost:
-        """What answers cost at the highest threshold at which so many are right, if there are so many."""
+        """What answers cost at the highest threshold at which `count` of them are right, or as many as there are."""
         sure = decide.confidence(answers)
         rightly = np.sort(sure[self.right(answers)])[::-1]
         return self.cost(answers, sure >= (rightly[min(count, len(rightly)) - 1] if count and len(rightly) else 1.0))
