@@ -59,6 +59,11 @@ class Bunches:
         heard, held = self._heard, self._held
         if len(heard) > REMEMBERED_SOURCES:
             heard.clear()
+        sources = [source for _, source in packets]
+        before = min([heard.get(source, arrivals[0]) for source in set(sources)], default=0.0)
+        if not held and packets and arrivals[-1] - before < QUIET_S:  # nobody has paused, as nearly always
+            heard.update(zip(sources, arrivals, strict=True))
+            return list(packets), list(arrivals)
         others: list[tuple[float, Packet]] = []
         for packet, arrival in zip(packets, arrivals, strict=True):
             source = packet[1]

@@ -101,7 +101,7 @@ class Desk:
 
     def _count(self, arrived: Arrived) -> None:
         sensors, taken, lost, duplicates, late, implausible = arrived
-        for label, number in Counter(map(self._metrics.sensor_label, sensors)).items():
+        for label, number in Counter(self._metrics.sensor_labels(sensors)).items():
             for result, count in (("ok", taken), ("lost", lost), ("duplicate", duplicates), ("late", late)):
                 if count:
                     self._metrics.frames.add(label, result, count=number * count)

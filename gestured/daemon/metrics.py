@@ -6,7 +6,8 @@ peer can choose, such as sensors, are counted together after the first few.
 
 import time
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import repeat
 
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.listening import DISARMED, INHIBITED
@@ -118,7 +119,7 @@ class Metrics:
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
         self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets so far, and monotonic s when more were dropped
-        self._named: set[str] = set()
+        self._named: dict[str, str] = {}  # the labels of the first few sensors, by name
         self._said: dict[str, float] = {}  # by sensor: s, when its last unanswered provisional event was decided
 
     def kernel(self, drops: int) -> None:
@@ -159,9 +160,12 @@ class Metrics:
 
     def sensor_label(self, sensor: str) -> str:
         """The label of a sensor: its name for the first few sensors, "other" for all later ones."""
-        if sensor in self._named:
-            return sensor
         if len(self._named) < NAMED_SENSORS:
-            self._named.add(sensor)
-            return sensor
-        return OTHER
+            self._named.setdefault(sensor, sensor)
+        return self._named.get(sensor, OTHER)
+
+    def sensor_labels(self, sensors: Sequence[str]) -> Iterable[str]:
+        """The labels of sensors, in their order."""
+        if len(self._named) < NAMED_SENSORS:
+            return map(self.sensor_label, sensors)
+        return map(self._named.get, sensors, repeat(OTHER))  # each frame passes here
