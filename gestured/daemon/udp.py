@@ -267,6 +267,7 @@ class Receiver:
         self.read()
         if self._again is None:
             self._desk.take(self._hub.ask(self._clock()))
+            self._set_anew()
         self._asking = self._loop.call_soon(self._ask) if self._hub.asks else None
 
     def _foresee(self) -> None:
@@ -277,6 +278,7 @@ class Receiver:
             began = self._clock()
             self._desk.take(self._hub.look(began))
             took_s = self._clock() - began
+            self._set_anew()
         pause_s = PAUSE_S + REST * took_s
         self._foreseeing = self._loop.call_later(pause_s, self._foresee) if self._hub.looks else None
 
@@ -292,6 +294,15 @@ class Receiver:
             if self._due < math.inf:
                 woken = self._due - EARLY_S if self._sparse else self._due + EARLY_S
                 self._alarm = self._loop.call_later(max(woken - self._clock(), 0.0), self._wait)
+
+    def _set_anew(self) -> None:
+        """Set the alarm anew after a run of the model, by which it would be late otherwise.
+
+        libuv sleeps for as long as was left when it last looked at the clock, which it does not do after a callback
+        but when a timer is set.
+        """
+        self._forget_alarm()
+        self._expect()
 
     def _wait(self) -> None:
         """Decide what is due. A millisecond before, come back in each turn of the loop, which serves everybody else."""

@@ -65,9 +65,10 @@ class Machine:
         self._stops = stops
         self._rules: list[Rule] = []
         self._timers: list[Timer] = []
+        self._looked = self.now  # s, when the loop last looked at its clock
         self._reader: Callable[[], None] | None = None
         self.looks, self.look_s, self.looked_s = False, 0.0, 0.0  # at contacts, for provisional events
-        self.asks = 0  # segments that wait for their names, which cost as much
+        self.asks = self.shown = 0  # segments that wait for their names, which cost as much, and that a packet shows
         self.latest_s = 0.0  # that a packet was served after it came
         self.received = 0  # times that packets were handed on
         self.moved_s = 0.0  # by which the time that a packet was given differed from when it came
@@ -108,6 +109,7 @@ class Machine:
         self._reader = None
 
     def call_later(self, seconds: float, act: Callable[[], None]) -> Timer:
+        self._looked = self.now
         self._timers.append(Timer(self.now + round(seconds, 3), act))  # a loop's timers know milliseconds alone
         return self._timers[-1]
 
@@ -115,7 +117,11 @@ class Machine:
         return self.call_later(0.0, act)
 
     def turn(self) -> None:
-        """Do what is due, or wait for what is next."""
+        """Do what is due, then wait for what is next, for as long as was left when the loop last looked at its clock.
+
+        That is when a turn began or a timer was set, as in libuv.
+        """
+        self._looked = self.now
         self._timers = [timer for timer in self._timers if not timer.cancelled]
         due = [timer for timer in self._timers if timer.when <= self.now]
         self._timers = [timer for timer in self._timers if timer.when > self.now]
@@ -124,8 +130,9 @@ class Machine:
                 timer.act()
         if self._buffer and self._reader is not None:
             self._reader()
-        elif not due:
-            following = [timer.when for timer in self._timers] + [t for t, _, _ in list(self._sent)[:1]]
+        else:
+            timers = [self.now + timer.when - self._looked for timer in self._timers if not timer.cancelled]
+            following = timers + [t for t, _, _ in list(self._sent)[:1]]
             self.passes(max(0.0, min(following, default=self.now) - self.now))
         self.passes(TURN_S)
 
@@ -161,6 +168,7 @@ class Machine:
             self.work(self._cost(packet))
             self.served.append((packet, source))
             self.due = now + self.due_s
+            self.asks += self.shown
         return []
 
     def ask(self, now: float) -> list[Any]:
@@ -350,12 +358,18 @@ def test_of_segments_that_are_shown_together_each_gets_its_name_and_no_packet_wa
     assert machine.latest_s < many(4.0).latest_s + 2 * 0.001
 
 
+@pytest.mark.parametrize("look_s", [0.0, 0.004])
 @pytest.mark.parametrize(("apart_s", "most_s"), [(1 / 15, 0.0002), (0.008, 0.0022)])
-def test_what_time_alone_decides_waits_neither_for_a_packet_nor_for_a_tick(apart_s: float, most_s: float) -> None:
-    """It is decided at that moment; beside packets that come often, with the next turn of a timer of milliseconds."""
+def test_what_time_alone_decides_waits_neither_for_a_packet_nor_for_a_tick(
+    apart_s: float, most_s: float, look_s: float
+) -> None:
+    """It is decided at that moment; beside packets that come often, with the next turn of a timer of milliseconds.
+
+    That the model ran for `look_s` just before makes it no later.
+    """
     for due_s in (0.0301, 0.1317):
         machine = Machine([(0.01 + n * apart_s, b"x", ("10.0.0.1", 1)) for n in range(5)], lambda packet: 1e-5)
-        machine.due_s = due_s
+        machine.due_s, machine.shown, machine.look_s = due_s, int(look_s > 0), look_s
         run(machine, 1.0)
         (late_s,) = machine.waits_s[-1:]
         assert 0.0 <= late_s < most_s
