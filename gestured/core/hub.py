@@ -93,7 +93,7 @@ class Hub:
         found: dict[int, list[Arrival]] = {}
         blocks = self._together(packets, facts) if together else []
         alone: Collection[int] = range(len(packets))
-        if sum([len(block.packets) for block in blocks]) == len(packets):
+        if blocks and sum([len(block.packets) for block in blocks]) == len(packets):
             alone = ()
         elif blocks:
             alone = sorted(set(alone).difference(*(block.packets for block in blocks)))

@@ -44,12 +44,12 @@ class Bunches:
     @property
     def oldest(self) -> float:
         """When the oldest packet that is held back came, in s; infinite if there is none."""
-        return min((bunch.arrivals[0] for bunch in self._held.values()), default=math.inf)
+        return min([bunch.arrivals[0] for bunch in self._held.values()]) if self._held else math.inf
 
     @property
     def due(self) -> float:
         """When the next bunch is complete unless more packets come before, in s; infinite if there is none."""
-        return min((bunch.over for bunch in self._held.values()), default=math.inf)
+        return min([bunch.over for bunch in self._held.values()]) if self._held else math.inf
 
     def pick(self, packets: Sequence[Packet], arrivals: Sequence[float]) -> tuple[list[Packet], list[float]]:
         """Hold back the packets that belong to bunches. Returns the others, and when they arrived (s).
@@ -83,7 +83,7 @@ class Bunches:
 
     def over(self, now: float) -> list[Bunch]:
         """Take the bunches that are complete at `now` (s); those that lie within TOGETHER_S become one."""
-        if now < self.due:
+        if not self._held:
             return []
         complete = {source: bunch for source, bunch in self._held.items() if bunch.over <= now}
         found: list[Bunch] = []
