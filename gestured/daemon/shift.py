@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.facts import Decided
-from gestured.core.frames import Segment
+from gestured.core.frames import SMALLEST, Segment
 from gestured.core.window import Window
 from gestured.model.features import MEASURES, measures
 from gestured.model.model import Model
@@ -81,7 +81,7 @@ class Shift:
 def measured(segment: Segment, window: Window) -> dict[str, float]:
     """Strength (peak over the sensor's noise) of a segment, and its `measures`."""
     touched = segment.frames[segment.first : segment.last + 1]
-    strength = float(touched.max()) / max(segment.noise, 1e-30)
+    strength = float(touched.max()) / max(segment.noise, SMALLEST)
     return {"strength": strength} | measures(window.apply(segment), window.rate_hz)
 
 
