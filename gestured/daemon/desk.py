@@ -9,6 +9,7 @@ from gestured.core import messages
 from gestured.core.address import Address
 from gestured.core.events import Cancelled, Event, Gesture, Status, Touch, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
+from gestured.core.hub import Hub
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
@@ -23,9 +24,9 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 class Desk:
     """Takes the hub's facts, the events of tests, and the packets that the receiver has dropped."""
 
-    def __init__(self, metrics: Metrics, shift: Shift, own: OwnGestures, views: Views, sinks: tuple[Sink, ...]) -> None:
-        self._metrics, self._own, self._views = metrics, own, views
-        self.sinks = sinks  # may be replaced between two events
+    def __init__(self, hub: Hub, metrics: Metrics, shift: Shift, own: OwnGestures, views: Views) -> None:
+        self._hub, self._metrics, self._own, self._views = hub, metrics, own, views
+        self.sinks: tuple[Sink, ...] = ()  # may be replaced between two events
         self.shift = shift  # how the segments differ from the training data of the model that answers
         self.models_failed = False  # whether no model could answer the last segment
         self.recent: deque[dict[str, Any]] = deque(maxlen=RECENT)  # the last answers, oldest first
@@ -65,7 +66,7 @@ class Desk:
         if isinstance(event, Touch):
             return  # touch events come up to 60 times a second and are no answers
         if not test:
-            self._metrics.event(event)
+            self._metrics.event(event, self._late_s(event))
             if isinstance(event, Gesture | Unknown):
                 self.models_failed = False
             elif isinstance(event, Cancelled) and event.reason == "model":
@@ -75,6 +76,12 @@ class Desk:
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)
             log.debug(messages.event_type(event), sensor=event.sensor, id=getattr(event, "id", None), gesture=name)
+
+    def _late_s(self, event: Event) -> float:
+        """How long ago an answer was decided, in s; 0 if only the sensor's own clock knows the time of the decision."""
+        if isinstance(event, Gesture | Unknown) and self._hub.scene.clock_of(event.sensor) == "arrival":
+            return time.monotonic() - event.decided
+        return 0.0
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count packets that were dropped; log the reason at a bounded rate."""

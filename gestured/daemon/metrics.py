@@ -127,10 +127,10 @@ class Metrics:
         if drops > self.kernel_drops:
             self.kernel_drops, self.kernel_dropped_at = drops, time.monotonic()
 
-    def event(self, event: Event) -> None:
-        """Count a published event, its latency and its confidence."""
+    def event(self, event: Event, late_s: float = 0.0) -> None:
+        """Count an event that was published `late_s` after its decision, its latency and its confidence."""
         if isinstance(event, Gesture | Unknown):
-            self.latency.observe(event.decided - event.offset)
+            self.latency.observe(event.decided - event.offset + late_s)
             if event.degraded:
                 self.degraded.add()
         if isinstance(event, Provisional):

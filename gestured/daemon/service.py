@@ -59,7 +59,7 @@ class Service:
         hub = Hub(scene_of(settings, ladder), ladder, later=True)
         taps, views = Taps(settings.flight_recorder << 20), Views(hub, lambda: status(self.parts), self._foresee)
         clients = EventServer(bound.events.sock, self._hello, metrics, known=self._known, changed=self._foresee)
-        desk = Desk(metrics, Shift.of(ladder.model), own, views, ())
+        desk = Desk(hub, metrics, Shift.of(ladder.model), own, views)
         receiver = Receiver(bound.udp, bound.since, hub, desk, taps)
         gates = Gatekeeper(hub, desk)
         self.parts = Parts(asked, bound, metrics, hub, own, desk, clients, taps, views, receiver, gates)

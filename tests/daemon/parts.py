@@ -71,7 +71,8 @@ class Parts:
         self.events = kept.events
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
         self.views = Views(self.hub, dict, lambda: None)
-        self.desk = Desk(self.metrics, Shift.of(ladder.model), OwnGestures(lambda: None), self.views, (kept,))
+        self.desk = Desk(self.hub, self.metrics, Shift.of(ladder.model), OwnGestures(lambda: None), self.views)
+        self.desk.sinks = (kept,)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:
         """Frames of a sensor at 15 Hz, from `t` s on; when the last one came."""

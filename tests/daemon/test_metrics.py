@@ -1,6 +1,8 @@
 """What is counted: bounded whatever arrives, and sound."""
 
+import math
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -102,6 +104,15 @@ def test_what_an_alert_counts_is_0_before_it_happens_first(usual: dict[str, Any]
     counted = re.findall(r"increase\((\w+(?:\{[^}]*\})?)\[\w+\]\) > ", rules)
     assert 'gestured_reloads_total{result="refused"}' in counted
     assert {f"{series} 0.0" for series in counted} <= set(exposition(Metrics(), usual).decode().splitlines())
+
+
+@pytest.mark.parametrize(("clock", "least", "most"), [("arrival", 5.2, math.inf), ("sensor", 0.19, 0.21)])
+def test_the_latency_counts_how_late_the_daemon_was(model: Path, clock: str, least: float, most: float) -> None:
+    """A decision has the time at which the wait was over, however late the daemon comes to it."""
+    parts, decided = Parts(model, clock=clock), time.monotonic() - 5.0
+    parts.desk.publish(Gesture("s", 1, "one_tap", 0.9, 1, decided - 0.5, decided - 0.2, decided, 3, 0, "m", False, {}))
+    (_, (seen,)) = parts.metrics.latency.values[()]
+    assert least <= seen <= most
 
 
 def test_every_reason_to_drop_has_its_place_in_that_count() -> None:
