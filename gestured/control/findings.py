@@ -147,6 +147,10 @@ def _input(status: dict[str, Any]) -> Iterator[Finding]:
         what = f"the kernel dropped {status['input']['kernel_drops']} packets that found no room"
         remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}, and look for a busy machine"
         yield _dated(what, _ages(status, "kernel_drops"), remedy)
+    if undated := status["input"].get("implausible"):  # an older daemon does not tell
+        what = f"{undated} frames were dated by their arrival, since their time tags are missing or impossible"
+        remedy = 'let the sensor send each frame in a bundle with its time, or set its clock = "arrival"'
+        yield _dated(what, _ages(status, "implausible").get("all"), remedy)
 
 
 def _ages(status: dict[str, Any], key: str) -> Any:

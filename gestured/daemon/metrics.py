@@ -79,7 +79,9 @@ class Metrics:
     def __init__(self) -> None:
         self.frames = Counter("gestured_frames", "Frames by what became of them", "sensor", "result")
         self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason", dated=True)
-        self.implausible = Counter("gestured_implausible_time_tags", "Time tags replaced by the arrival time")
+        self.implausible = Counter(
+            "gestured_implausible_time_tags", "Time tags replaced by the arrival time", dated=True
+        )
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
         self.zones = Counter(
             "gestured_zone_gestures",

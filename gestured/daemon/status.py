@@ -63,7 +63,11 @@ def status(parts: Parts) -> dict[str, Any]:
             "outside": {name: round(share, 3) for name, share in shift.shares().items()},
             "unlike": shift.unlike(),
         },
-        "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": kernel_drops(parts.bound.udp)},
+        "input": {
+            "dropped": _by_label(metrics.dropped.values),
+            "kernel_drops": kernel_drops(parts.bound.udp),
+            "implausible": metrics.implausible.total(),
+        },
         "output": {
             "subscribers": parts.clients.count,
             "backlog_bytes": parts.clients.backlog,
@@ -74,6 +78,7 @@ def status(parts: Parts) -> dict[str, Any]:
         "last_s_ago": {
             "dropped": _ages(metrics.dropped, now),
             "kernel_drops": round(now - metrics.kernel_dropped_at, 1) if metrics.kernel_drops else None,
+            "implausible": _ages(metrics.implausible, now),
             "lines_lost": _ages(metrics.lost_lines, now),
             "evicted": _ages(metrics.evicted, now),
             "osc": _ages(metrics.sent, now),

@@ -143,7 +143,19 @@ def test_a_sensor_that_hears_little_says_why(ctl, daemon: Daemon) -> None:
     assert awaited(daemon, "noisy", "ok")["reason"] == ""
 
 
-@pytest.mark.parametrize("kind", ["dropped", "lost frames", "kernel drops", "lines", "osc"])
+def test_a_sensors_clock_that_does_not_come_is_missed(run, serve) -> None:
+    daemon = serve("--clock", "sensor")
+    sensor, hand = Sensor(daemon, "untimed"), Hand()
+    for n in range(30):
+        sensor.sock.send(floats("/untimed/pressure", hand.frame(), n))  # no bundle, so no time tag
+    while not daemon.ask("status")["input"]["implausible"]:
+        pass
+    found = [json.loads(line) for line in run("doctor", "--control", daemon.ready["control"], "--json")[1].splitlines()]
+    (missed,) = [one for one in found if "time tags" in one["what"]]
+    assert missed["level"] == "warn" and 'clock = "arrival"' in missed["remedy"]
+
+
+@pytest.mark.parametrize("kind", ["dropped", "lost frames", "kernel drops", "time tags", "lines", "osc"])
 def test_what_still_happens_is_a_finding_and_what_is_over_is_none(daemon: Daemon, kind: str) -> None:
     name, many = kind.replace(" ", "_"), 777_777
     Sensor(daemon, name, counted).begin()
@@ -157,6 +169,8 @@ def test_what_still_happens_is_a_finding_and_what_is_over_is_none(daemon: Daemon
             status["sensors"][name] |= {"lost": many, "lost_s_ago": seconds}
         elif kind == "kernel drops":
             status["input"]["kernel_drops"], last["kernel_drops"] = many, seconds
+        elif kind == "time tags":
+            status["input"]["implausible"], last["implausible"] = many, {"all": seconds}
         elif kind == "lines":
             status["output"]["lines_lost"], last["lines_lost"] = many, {"all": seconds}
         else:
