@@ -1,7 +1,8 @@
 """One sensor: its frames in, its events out.
 
 `t` is seconds on the stream's clock, by which everything is decided; `now` is seconds on the hub's clock, by which
-frames arrive. A caller without arrivals (`gestured.open`, the lab) uses only `push`, `wait`, `flush`, `reset`, `due`.
+frames arrive. A caller without arrivals (`gestured.open`, the lab) uses only `push`, `wait`, `flush`, `reset`, `gate`
+and `due`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """A model's file before onnxruntime sees it: its bytes, its digest, its self-test, and that it needs no other file.
 
-Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
+Functions here raise ValueError with the reason; `shipped.naming` adds the file's name.
 """
 
 import base64

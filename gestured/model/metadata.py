@@ -1,6 +1,6 @@
 """The metadata of a model's file, in which the model describes itself, checked key by key.
 
-Functions here raise ValueError with the key and what was expected; `model.open_model` adds the file's name.
+Functions here raise ValueError with the key and what was expected; `shipped.naming` adds the file's name.
 """
 
 import json
