@@ -90,7 +90,7 @@ class Gatekeeper:
     def _require_known(self, sensor: str | None) -> None:
         """Raises Refusal for a sensor that was not heard and is not in the configuration."""
         if sensor is not None and not self._hub.knows(sensor):
-            known = ", ".join(self._hub.readings(time.monotonic()))
+            known = ", ".join(self._hub.states(time.monotonic()))
             raise Refusal(
                 f"no sensor {sensor!r}, expected one of {known or 'none: no sensor was heard, or is configured'}"
             )
@@ -98,7 +98,7 @@ class Gatekeeper:
     def _done(self, facts: Sequence[Fact], gate: str, sensor: str | None, bridge: str) -> Reply:
         """Publish the facts of a change; the reply says which gates of the sensors in question are closed now."""
         self._desk.take(facts)
-        names = self._hub.readings(time.monotonic()) if sensor is None else [sensor]
+        names = self._hub.states(time.monotonic()) if sensor is None else [sensor]
         closed = {name: sorted(self._hub.gates.of(name)) for name in names}
         if facts and bridge:
             self._throttle.info("a bridge has changed what is closed", bridge, gate=gate, closed=closed)
