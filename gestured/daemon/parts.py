@@ -70,8 +70,11 @@ class Parts:
         return (*self.hub.scene.gestures, *self.own.gestures)
 
     @property
-    def served(self) -> float:
-        """The time up to which packets were served, in monotonic s: a sensor whose packets wait is not silent."""
+    def as_of(self) -> float:
+        """The time for which states hold, in monotonic s: now, or earlier if packets wait, as their sensors still send.
+
+        `Receiver.served`, by which things are decided, may lie further back: packets may have come since the last read.
+        """
         return time.monotonic() - self.receiver.behind_s
 
     @property
@@ -81,7 +84,7 @@ class Parts:
 
     def readings(self) -> dict[str, Reading]:
         """The reading of each sensor, heard or in the configuration."""
-        return self.hub.readings(self.served)
+        return self.hub.readings(self.as_of)
 
     def listening(self) -> dict[str, dict[str, Any]]:
         """By sensor that has closed gates or arming, their state; `until` is in s since the Unix epoch."""

@@ -155,7 +155,7 @@ class Service:
         for part in (parts.clients, parts.taps, parts.views, parts.own):
             part.tick()
         parts.metrics.kernel(kernel_drops(parts.bound.udp))
-        states = parts.hub.states(parts.served)  # not `status`, which is a stall for a thousand sensors
+        states = parts.hub.states(parts.as_of)  # not `status`, which is a stall for a thousand sensors
         state = overall(states, impaired=parts.impaired)
         parts.desk.publish(Status(state, states, active, time.time(), parts.listening()))
         shown = ", ".join(f"{name} {state}" for name, state in list(states.items())[:SHOWN])
