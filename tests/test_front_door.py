@@ -216,6 +216,18 @@ def test_a_broken_value_costs_its_frame_alone(recognizer: Any, value: float, kin
     assert [type(event) for event in events] == [Onset]
 
 
+def test_frames_that_are_passed_over_count_as_lost(recognizer: Any):
+    """The caller may have lost some himself."""
+    hand, lost = Hand(), []
+    shown = [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0)]
+    for n, frame in enumerate(shown):
+        passed_over = n in (32, 33)
+        values = np.full((9, 9), np.nan) if passed_over else frame
+        events = recognizer.push(n / 15, values, lost=int(n == 33))
+        lost += [event.lost for event in events if hasattr(event, "lost")]
+    assert lost == [3]
+
+
 @pytest.mark.parametrize("gate", [5, "", "back door", None], ids=repr)
 def test_a_gate_has_a_name_and_another_word_closes_nothing(recognizer: Any, gate: Any):
     with pytest.raises(ValueError, match="gate: expected 1 to 64"):

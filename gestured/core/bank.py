@@ -205,7 +205,7 @@ class Bank:
         idle, activity = conditioner.idle, conditioner.activity
         owner.heard = owner.source_heard = vitals.last = stamper.arrived = arrived
         stamper.last = front.pace.last = idle.followed = last
-        stamper.tag = None if math.isnan(tag) else tag
+        stamper.tag, stamper.overtaken = None if math.isnan(tag) else tag, 0
         if not math.isnan(counter):
             stamper.counter, stamper.late = int(counter), (0, 0)
         front.pace.interval_s, vitals.jitter_s = interval, jitter

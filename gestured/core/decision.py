@@ -17,13 +17,15 @@ class Decision:
     user's own may take a segment that the model does not know, or one that is much nearer to it than to the model's.
     """
 
-    def __init__(self, scene: Scene, sensor: str) -> None:
+    def __init__(self, scene: Scene, sensor: str, before: "Decision | None" = None) -> None:
+        """The decision for a sensor of a scene; refractory pauses that began `before` go on."""
         self._in_use = frozenset(scene.gestures)
         self._thresholds, self._refractory = scene.thresholds, scene.refractory
         self._strictness = scene.strictness_of(sensor)
         zones = scene.setup(sensor).zones.items()
         self.restricted = {name: frozenset(zone.gestures) for name, zone in zones if zone.gestures is not None}
-        self._last_offset: dict[str, float] = {}  # by gesture: s, the offset of the last published one
+        # By gesture: s, the offset of the last published one.
+        self._last_offset: dict[str, float] = {} if before is None else before._last_offset
 
     def may(self, gesture: str, zone: str | None) -> bool:
         """Whether a contact that began in that zone of the sensor may be that gesture."""

@@ -368,7 +368,8 @@ class Sensor:
             self.stamper = Stamper(scene.clock_of(self.name))
         if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
             facts.append(self._gate(self.stamper.at(now)))
-        self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
+        self.classifier, self._asked = classifier, None
+        self._decision = Decision(scene, self.name, None if another_clock else self._decision)
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
         self._fingers.zones = self._zones
@@ -408,7 +409,7 @@ class Sensor:
 
     def review(self, now: float, facts: list[Fact]) -> None:
         """Do what is not needed with each frame; called with each tick, at `now` (s)."""
-        self.vitals.review(self.front_end)
+        self.run(lambda sensor: sensor.vitals.review(sensor.front_end), now, facts)
         if self._listening.armed:
             self._run(self.lapse, now, facts)
 

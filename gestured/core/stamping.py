@@ -26,7 +26,8 @@ class Stamper:
     """What gives the frames of one sensor their times.
 
     With the `clock` "arrival", a frame was felt when it arrived. With "sensor", its time is the last one plus the
-    step of the time tags, if that is forward and at most `MAX_STEP_S`; else the arrival is used. Frames of one call
+    step of the time tags, if that is forward and at most `MAX_STEP_S`; else the arrival is used. Without a counter, a
+    tag that is a little older than the last one shows that the frame was overtaken on its way. Frames of one call
     that share a time are spaced backwards from it at the rate seen so far (`PERIOD_S` apart until that is known), by
     the counter or evenly, and never before the last frame. So stamp all waiting frames in one call: a stall then
     does no harm.
@@ -39,6 +40,7 @@ class Stamper:
     REORDER = 16  # a frame whose counter is further back was not overtaken on its way: the sensor began anew
     REORDER_S = 0.5  # if a counter goes back after a longer pause, the sensor began anew
     STREAK = 3  # if the counters of so many late frames in a row rise by one, the sensor began anew
+    OVERTAKEN_S = 1.0  # if a time tag goes back further, or STREAK times in a row, the sensor's clock was set
     RECENT = 15  # the usual interval is the median of so many, a second of a sensor at 15 Hz
     LEAP = 10_000  # if a counter jumps further (ten seconds at 1000 Hz), the sensor began anew, and nothing was lost
 
@@ -51,6 +53,7 @@ class Stamper:
         self.ahead = 0.0  # s by which that frame's stamp lies beyond its tag, if an earlier frame had the same tag
         self.counter: int | None = None  # of the newest frame
         self.late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many of them came in a row
+        self.overtaken = 0  # how many frames in a row had an older time tag
 
     def at(self, arrived: float) -> float:
         """The stream's time in s of a frame that `arrived` then (s): the last stamp plus the time since its arrival."""
@@ -107,6 +110,8 @@ class Stamper:
             steps, dropped, restarted = self._count(counter, arrived - self.arrived)
             if dropped:
                 return Stamp(math.nan, 0, dropped, False, False)
+        elif self.by_tag and self._was_overtaken(tag):
+            return Stamp(math.nan, 0, "late", False, False)
         t, last, implausible = arrived, self.last, self.by_tag and tag is None
         if last is not None:
             if self.by_tag:
@@ -118,6 +123,12 @@ class Stamper:
                 t = last + self.MIN_STEP_S
         self.last, self.arrived, self.tag = t, arrived, tag
         return _new(Stamp, (t, steps - 1, "", restarted, implausible))
+
+    def _was_overtaken(self, tag: float | None) -> bool:
+        """Whether a frame without a counter was overtaken on its way, as its time `tag` (s) shows."""
+        older = tag is not None and self.tag is not None and 0 < self.tag - tag <= self.OVERTAKEN_S
+        self.overtaken = self.overtaken + 1 if older else 0
+        return 0 < self.overtaken < self.STREAK
 
     def _count(self, counter: int | None, pause: float) -> Counted:
         """(periods since the frame before, why it is dropped, whether the sensor restarted)."""

@@ -61,6 +61,7 @@ class Embedded:
         self._sensor = sensor
         self._shape = sensor.front_end.grid_sent
         self._last = -math.inf  # s, the time of the last frame
+        self._lost = 0  # frames that were lost or passed over since the one before
         self._closed: set[str] = set()  # names of the closed gates
 
     def __reduce_ex__(self, _: object) -> NoReturn:
@@ -84,8 +85,11 @@ class Embedded:
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = seconds
+        self._lost += lost
         if not np.all(np.abs(frame) <= np.float64(LARGEST)):  # NaN fails this, too; a float16 could not hold the bound
+            self._lost += 1
             return []
+        lost, self._lost = self._lost, 0
         return events_of(self._sensor.push(Frame(seconds, frame, tuple(touches), lost)))
 
     @property

@@ -378,8 +378,8 @@ def test_after_a_fault_in_its_stamps_a_contact_ends_by_the_streams_clock(
     assert onset.onset < release.offset < onset.onset + 1.0
 
 
-@pytest.mark.parametrize("act", ["change", "restart"])
-def test_a_sensor_that_is_broken_holds_up_no_reload_and_no_recalibration_of_others(act: str) -> None:
+@pytest.mark.parametrize("act", ["change", "restart", "tick"])
+def test_a_sensor_that_is_broken_holds_up_no_reload_no_recalibration_and_no_tick_of_others(act: str) -> None:
     hub, hand = Hub(SCENE, Sure()), Hand()
     shown = hand.idle(2.0)
     for t, packet, source in sorted(stream("arm", shown, FIRST) + stream("leg", shown, SECOND)):
@@ -389,7 +389,10 @@ def test_a_sensor_that_is_broken_holds_up_no_reload_and_no_recalibration_of_othe
         facts = hub.change(replace(SCENE, tap_gap_s=0.3), Sure(), 2.1)
         facts += hub.receive([(floats("/arm/pressure", hand.frame(), 0), FIRST)], 2.2)
         assert any(isinstance(fact, Taken) for fact in facts), "what is made anew is sound"
-    else:
+    elif act == "restart":
         facts = hub.restart(["arm", "leg"], 2.1)
+    else:
+        hub._sensors["arm"].vitals.review = lambda front_end: 1 / 0  # type: ignore[assignment, return-value]
+        facts = hub.tick(2.1)
     assert {fact.sensor for fact in facts if isinstance(fact, Fault)} == {"arm"}
-    assert states(hub, 2.2)["leg"] == "starting"
+    assert states(hub, 2.2)["leg"] == ("ok" if act == "tick" else "starting")

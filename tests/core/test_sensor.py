@@ -354,6 +354,14 @@ def test_a_gesture_is_not_repeated_within_its_refractory_time() -> None:
     assert begins[1] - ends[0] < 2.5 <= begins[4] - ends[0]  # a cancelled one does not prolong it
 
 
+def test_a_reload_ends_no_refractory_pause() -> None:
+    first, again = swipes(1), [replace(frame, t=frame.t + 3.0) for frame in swipes(1)]
+    subject = recognizer(Fake(), refractory={"double_tap": 60.0})
+    events = run(subject, first)
+    subject.change(Scene(GESTURES, (9, 9), refractory={"double_tap": 30.0}), Fake(), 0.0, [])
+    assert [type(event) for event in answers(events + run(subject, again))] == [Gesture, Cancelled]
+
+
 def test_what_is_unknown_has_no_refractory_time() -> None:
     classifier = Fake([says(0.2, 0.1, 0.1), SURE])
     events = answers(run(recognizer(classifier, refractory={"double_tap": 60}), swipes(2)))

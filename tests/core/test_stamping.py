@@ -146,6 +146,19 @@ def test_an_impossible_time_tag_is_replaced_by_the_arrival(tag: float | None) ->
     assert times(got) == [50.0, 50.5] and [s.implausible for s in got] == [False, True]
 
 
+def test_a_frame_that_was_overtaken_is_late_and_moves_no_other_by_the_sensors_clock() -> None:
+    """Without a counter its time tag shows it; a clock that was set back is believed after a few frames."""
+    order = [n for n in range(60) if n % 12 != 5]
+    for n in range(5, 48, 12):
+        order.insert(order.index(n + 9) + 1, n)  # comes after nine others
+    got = stamps(Stamper("sensor"), *[(50 + i * P, [felt(timetag=1000 + n * P)]) for i, n in enumerate(order)])
+    assert [s.dropped == "late" for s in got] == [n % 12 == 5 and i > n for i, n in enumerate(order)]
+    assert times(got) == pytest.approx([50 + n * P for i, n in enumerate(order) if n % 12 != 5 or i <= n])
+    back = stamps(Stamper("sensor"), *[(50 + n * P, [felt(timetag=1000 + n * P - 0.5 * (n > 9))]) for n in range(30)])
+    assert [n for n, s in enumerate(back) if s.dropped] == [10, 11]
+    assert times(back) == pytest.approx([50 + n * P for n in range(30) if n not in (10, 11)])
+
+
 def test_ten_seconds_forward_are_plausible() -> None:
     got = stamps(Stamper("sensor"), (50.0, [felt(timetag=1000.0)]), (50.5, [felt(timetag=1010.0)]))
     assert times(got) == [50.0, 60.0] and not got[1].implausible
