@@ -186,6 +186,10 @@ def test_sliders_follow_a_finger(sensor: Sensor, browser: Browser) -> None:
         browser.until(f"Math.abs({at}[0] - {end / 8}) < 0.03")
         assert browser.run(at)[1] == pytest.approx(before + (end - begin) / 8, abs=0.06)
         show(sensor, browser, hand.idle(1.0))
+    lost = "{ id: 1, touch: 1, phase: 'down', x: 0 }"  # and its `up`, at a broker that was away
+    after = "{ id: 2, touch: 0, phase: 'down', x: 1 }"
+    script = f"(to => {{ const take = slider(to); take({lost}); take({after}); return to.value }})({{}})"
+    assert browser.run(script) == 1
     assert browser.complaints() == []
 
 

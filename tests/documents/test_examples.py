@@ -23,7 +23,7 @@ from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.deploy.compilers import CPP, POSIX, C, compiled
 from tests.documents.blocks import ROOT, Block, blocks
-from tests.sockets import free_address
+from tests.sockets import HELLO, FakeDaemon, free_address
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
 COMPILERS = pytest.mark.parametrize(("compiler", "standard"), [("gcc", C), ("g++", CPP)])
@@ -206,6 +206,33 @@ def test_a_slider_that_follows_the_finger(place: Place):
     assert [line[0] for line in swipe] == ["down", *["move"] * (len(swipe) - 2), "up"]
     (absolute, relative), (to, by) = (map(float, line[1:]) for line in (swipe[0], swipe[-1]))
     assert abs(to - absolute) > 50 and by == pytest.approx(min(max(relative + to - absolute, 0), 100), abs=2)
+
+
+def heard(place: Place, folder: Path, phrase: str, *connections: tuple[object, ...]) -> list[str]:
+    """What an example prints that hears these lines, one connection after the other."""
+    fake = FakeDaemon(folder / "events.sock")
+    text = example(phrase).text.replace("/run/gestured/events.sock", str(fake.path))
+    with fake.listener, place.running(sys.executable, "-uc", text) as process:
+        for hello, *lines in connections:
+            fake.accept(hello)
+            fake.request()
+            fake.say(*lines)
+            fake.close()
+        fake.accept()  # by now it has read what came before
+        process.kill()
+        assert process.stdout is not None
+        return process.stdout.readlines()
+
+
+def test_a_slider_follows_the_next_finger_if_an_up_was_lost(place: Place, tmp_path: Path):
+    """A daemon that is killed with a finger down, or a client that is too slow, leaves a `down` without its `up`."""
+    finger = {"type": "touch", "sensor": "console", "t": 1.0, "y": 0.5, "dx": 0.0, "dy": 0.0, "pressure": 9.0}
+    finger |= {"area": 4, "zone": None}
+    before = (HELLO, finger | {"id": 41, "touch": 1, "phase": "down", "x": 0.5})
+    fingers = ((0, "down"), (1, "down"), (1, "up"), (0, "up"))
+    after = (finger | {"id": 1, "touch": touch, "phase": phase, "x": touch} for touch, phase in fingers)
+    said = heard(place, tmp_path, "starts where one touches", before, (HELLO | {"instance": "another"}, *after))
+    assert said == ["down 50 50\n", "down 0 50\n", "up 0 50\n"]
 
 
 def test_one_sensor_in_a_process_of_ones_own(place: Place):
