@@ -23,7 +23,7 @@ from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.deploy.compilers import CPP, POSIX, C, compiled
 from tests.documents.blocks import ROOT, Block, blocks
-from tests.sockets import HELLO, FakeDaemon, free_address
+from tests.sockets import GESTURE, HELLO, FakeDaemon, free_address
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
 COMPILERS = pytest.mark.parametrize(("compiler", "standard"), [("gcc", C), ("g++", CPP)])
@@ -233,6 +233,19 @@ def test_a_slider_follows_the_next_finger_if_an_up_was_lost(place: Place, tmp_pa
     after = (finger | {"id": 1, "touch": touch, "phase": phase, "x": touch} for touch, phase in fingers)
     said = heard(place, tmp_path, "starts where one touches", before, (HELLO | {"instance": "another"}, *after))
     assert said == ["down 50 50\n", "down 0 50\n", "up 0 50\n"]
+
+
+def test_what_was_missed_between_two_connections_is_counted(place: Place, tmp_path: Path):
+    """A client that does not read is cut off; then the hello names gestures of which it has not heard."""
+    said = heard(
+        place,
+        tmp_path,
+        "across its restarts",
+        (HELLO | {"sensors": {"armrest": 4}}, GESTURE | {"sequence": 5}),
+        (HELLO | {"sensors": {"armrest": 8}}, GESTURE | {"sequence": 9}),
+        (HELLO | {"instance": "another", "sensors": {"armrest": 2}}, GESTURE | {"sequence": 3}),
+    )
+    assert [line.split(" ", 3)[3] for line in said] == ["0 missed\n", "3 missed\n", "0 missed\n"]
 
 
 def test_one_sensor_in_a_process_of_ones_own(place: Place):
