@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from gestured.core.errors import GesturedError
     from gestured.core.events import (
         Cancelled,
+        Event,
         Gate,
         Gesture,
         Onset,
@@ -24,10 +25,12 @@ if TYPE_CHECKING:
     from gestured.core.scene import Scene
     from gestured.core.sensor import Sensor
     from gestured.core.sensor import Sensor as Recognizer
-    from gestured.model.embedded import open
+    from gestured.model.embedded import Embedded, open
 
 __all__ = [
     "Cancelled",
+    "Embedded",
+    "Event",
     "Frame",
     "Gate",
     "Gesture",
@@ -52,6 +55,7 @@ _HOMES = {
     "core.errors": ("GesturedError",),
     "core.events": (
         "Cancelled",
+        "Event",
         "Gate",
         "Gesture",
         "Onset",
@@ -65,7 +69,7 @@ _HOMES = {
     "core.hub": ("Hub",),
     "core.scene": ("Scene",),
     "core.sensor": ("Recognizer", "Sensor"),
-    "model.embedded": ("open",),
+    "model.embedded": ("Embedded", "open"),
 }
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -65,7 +65,13 @@ def test_what_listens_needs_neither_numpy_nor_a_model():
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("name", gestured.__all__)
+def test_types_of_open_and_push_have_public_names():
+    """A typed program cannot otherwise say what a function of its own takes."""
+    assert get_type_hints(gestured.open)["return"] is gestured.Embedded
+    assert get_type_hints(gestured.Embedded.push)["return"] == list[gestured.Event]
+
+
+@pytest.mark.parametrize("name", sorted({*gestured.__all__} - {"Event"}))
 def test_each_name_is_there_when_it_is_used(name: str):
     assert getattr(gestured, name).__name__ == {"Recognizer": "Sensor", "TouchEvent": "Touch"}.get(name, name)
     assert name in dir(gestured)
