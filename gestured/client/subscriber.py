@@ -139,7 +139,8 @@ class Subscriber:
                     over = time.monotonic() >= end
                     self._wait(end)
                     if over and not self._unread and not self._closed:
-                        raise TimeoutError(f"no event within {self._timeout:g} s")
+                        faults = filter(None, (source.fault for source in self._sources))
+                        raise TimeoutError(": ".join((f"no event within {self._timeout:g} s", *faults)))
         except GesturedError:
             self._closed = True
             raise
@@ -207,7 +208,7 @@ class Subscriber:
             return None
         if not source.hello:
             _check_hello(text, message, source.path)
-            source.hello, source.due, source.wait_s = message, math.inf, FIRST_S
+            source.hello, source.due, source.wait_s, source.fault = message, math.inf, FIRST_S, ""
         elif words := wrong_field(message):
             self._say(f"a line of the daemon on {source.path} is passed over: {words}")
             return None
@@ -221,7 +222,7 @@ class Subscriber:
         if source.lines is not None:
             self._selector.unregister(source.lines.socket)
             source.lines.close()
-        source.lines, source.hello = None, {}
+        source.lines, source.hello, source.fault = None, {}, str(error)
         self._unread = deque(line for line in self._unread if line[0] is not source)  # of no connection now
         source.begun.clear()
         source.due = time.monotonic() + source.wait_s
@@ -246,3 +247,4 @@ class _Source:
     begun: bytearray = field(default_factory=bytearray)  # the part of a line whose end has not come yet
     due: float = 0.0  # monotonic s: when to connect, or by when the hello must have come
     wait_s: float = FIRST_S  # how long to wait after the next failure
+    fault: str = ""  # why it is not connected (any more)

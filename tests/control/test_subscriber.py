@@ -154,6 +154,22 @@ def test_close_in_a_forked_child_leaves_the_connection_to_its_parent(fake: FakeD
         assert next(subscriber)["sequence"] == 5 and child.exitcode == 0
 
 
+def test_a_timeout_says_which_daemon_is_not_there(tmp_path: Path):
+    """A mistake in a path otherwise looks like a sensor that nobody touches."""
+    path = tmp_path / "events.sock"
+    with Subscriber(path, timeout=0.05) as subscriber:
+        with pytest.raises(TimeoutError, match=rf"0\.05 s: no daemon on {path}: No such file or directory; start"):
+            next(subscriber)
+        fake = FakeDaemon(path)
+        with fake.listener, serving(fake, GESTURE):
+            heard = None
+            while heard is None:
+                with suppress(TimeoutError):
+                    heard = next(subscriber)
+            with pytest.raises(TimeoutError, match=r"no event within 0\.05 s$"):
+                next(subscriber)
+
+
 def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path):
     subscriber = Subscriber(tmp_path / "none.sock")
     events = read_ahead(subscriber)
