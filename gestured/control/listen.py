@@ -56,9 +56,11 @@ def run(args: argparse.Namespace) -> int:
                     _repeat(line, event)
                 elif kind == "hello":
                     told(_greeting(event))
+                elif kind == "gestures":
+                    told(f"gestures: {', '.join(event['gestures'])}")
                 else:
                     say(readable(event, early))
-                if left is not None and kind not in ("hello", "lost"):
+                if left is not None and kind not in ("hello", "lost", "gestures"):
                     left -= 1
                     if left <= 0:
                         return 0

@@ -57,6 +57,12 @@ def test_every_type_has_its_line(listen) -> None:
         assert words in line
 
 
+def test_another_list_of_gestures_is_no_event(listen) -> None:
+    status, (line,), err = listen([{"type": "gestures", "gestures": ["one_tap", "knock"]}, GESTURE], "--count", 1)
+    assert status == 0 and "swipe_left" in line
+    assert "gestures: one_tap, knock" in err
+
+
 EARLY = {
     "type": "provisional", "sensor": "armrest", "id": 4, "gesture": "swipe_left", "confidence": 0.97,
     "onset": 1000.0, "decided": 1000.375,
