@@ -184,7 +184,7 @@ class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
             except ValueError as error:
                 warn(f"an image for {sensor} is dropped: {error}")
                 return
-            counter = (counter + 1) & 0x7FFFFFFF
+            counter += 1  # `form` wraps it, as the daemon expects
             stamp = image.header.stamp
             moment = stamp.sec + 1e-9 * stamp.nanosec or None
             try:
