@@ -165,13 +165,13 @@ def test_the_form_of_frames_changes_nothing(grid: tuple[int, int], count: int, b
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("at", range(SIZE))
-def test_a_frame_with_a_value_that_is_not_finite_is_refused(value: float, at: int) -> None:
-    values = [1.0] * SIZE
-    values[at] = value
-    assert fault(pressure(values)) == "not_finite"
-    assert fault(pressure(values, 5)) == "not_finite"
-    assert fault(blob(np.array(values, ">f4").tobytes())) == "not_finite"
+def test_a_frame_with_a_value_that_is_not_finite_is_refused(value: float) -> None:
+    for at in range(SIZE):
+        values = [1.0] * SIZE
+        values[at] = value
+        assert fault(pressure(values)) == "not_finite"
+        assert fault(pressure(values, 5)) == "not_finite"
+        assert fault(blob(np.array(values, ">f4").tobytes())) == "not_finite"
 
 
 @pytest.mark.parametrize(

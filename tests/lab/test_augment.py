@@ -63,16 +63,16 @@ def padded_batch(tail: int = 6) -> Tensor:
     return x
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_variation_keeps_the_scale_and_leaves_padding_alone(seed: int) -> None:
+def test_variation_keeps_the_scale_and_leaves_padding_alone() -> None:
     x = padded_batch()
-    y = varied(x, torch.Generator().manual_seed(seed))
-    assert y.shape == x.shape
-    assert bool(torch.isfinite(y).all())
-    assert float(y.min()) >= 0
-    assert torch.allclose(y.amax((1, 2, 3)), torch.ones(len(y)))
-    for row, frames in enumerate(gestures().values()):
-        assert float(y[row, len(frames) :].max()) == 0.0
+    for seed in range(40):
+        y = varied(x, torch.Generator().manual_seed(seed))
+        assert y.shape == x.shape
+        assert bool(torch.isfinite(y).all())
+        assert float(y.min()) >= 0
+        assert torch.allclose(y.amax((1, 2, 3)), torch.ones(len(y)))
+        for row, frames in enumerate(gestures().values()):
+            assert float(y[row, len(frames) :].max()) == 0.0
 
 
 def test_variation_is_the_generators_alone() -> None:
