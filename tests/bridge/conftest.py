@@ -18,7 +18,7 @@ import pytest
 
 from gestured.bridge.cli import main
 from gestured.client.control import Control
-from tests.daemon.harness import DEADLINE_S, Daemon
+from tests.daemon.harness import DEADLINE_S, Daemon, running
 from tests.sockets import free_address
 
 
@@ -113,9 +113,8 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
 def served(folder: Path, model: Path, *flags: object) -> Iterator[Daemon]:
     """For a fixture: a real daemon with the sensor's clock."""
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, *flags)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
+    with running(folder, model, "--stale-s", 30, *flags) as daemon:
+        yield daemon
 
 
 @pytest.fixture(scope="module")

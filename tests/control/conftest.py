@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 from socketserver import StreamRequestHandler, ThreadingUnixStreamServer
@@ -21,11 +21,12 @@ from gestured.control.cli import main
 from tests.control.browser import PROGRAM, Browser
 from tests.control.pages import Page, viewing
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, running
 from tests.sockets import FakeDaemon, meanwhile
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBERS = count()
+SLOW = ("--stale-s", 30)  # no sensor falls silent soon
 LONG = "n" * 64  # the longest name that a sensor may have
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
@@ -117,20 +118,11 @@ def told(run: Callable[..., tuple[int, str, str]], fake: FakeDaemon) -> Callable
     return finish
 
 
-@contextmanager
-def running(folder: Path, model: Path, *flags: object) -> Iterator[Daemon]:
-    """A real daemon with the sensor's clock, which ends well; no sensor falls silent soon."""
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, *flags)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
-
-
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon with a small model and a flight recorder."""
     folder = tmp_path_factory.mktemp("daemon")
-    with running(folder, tiny_model.make(folder / "tiny.onnx"), "--flight-recorder", 4) as daemon:
+    with running(folder, tiny_model.make(folder / "tiny.onnx"), *SLOW, "--flight-recorder", 4) as daemon:
         yield daemon
 
 
@@ -148,7 +140,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     config = folder / "gestured.toml"
     zones = f"[sensors.zoned.zones.left]\nat = [0, 0, 0.5, 1]\n[sensors.{LONG}.zones.{'z' * 64}]\nat = [0, 0, 1, 1]\n"
     config.write_text(f"touch = true\nflight_recorder = 4\n{zones}")
-    with running(folder, model, "--config", config) as daemon:
+    with running(folder, model, *SLOW, "--config", config) as daemon:
         yield daemon
 
 

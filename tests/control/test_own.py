@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gestured.control.status import own_faults
-from tests.control.conftest import running
+from tests.control.conftest import SLOW
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon
+from tests.daemon.harness import Daemon, running
 from tests.daemon.test_own import Performer, ready
 from tests.sockets import FakeDaemon
 
@@ -20,7 +20,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon that knows how to learn."""
     folder = tmp_path_factory.mktemp("own")
     model = tiny_model.make(folder / "tiny.onnx", own=tiny_model.own())
-    with running(folder, model, "--own-gestures", folder / "mine.json") as daemon:
+    with running(folder, model, *SLOW, "--own-gestures", folder / "mine.json") as daemon:
         yield daemon
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tests.daemon.harness import Daemon
+from tests.daemon.harness import Daemon, running
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -26,10 +26,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon with the sensor's clock and metrics, for tests that use sensors of their own."""
     folder = tmp_path_factory.mktemp("shared")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--max-sensors", 500)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    with running(folder, model, "--metrics", "127.0.0.1:0", "--max-sensors", 500) as daemon:
+        yield daemon
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -202,6 +203,15 @@ class Daemon:
             self.process.kill()
             assert self.process.stdout is not None
             self.process.stdout.close()
+
+
+@contextmanager
+def running(folder: Path, model: object, *flags: object, **more: Any) -> Iterator[Daemon]:
+    """A daemon with the sensor's clock, which ends well."""
+    daemon = Daemon.start(folder, model, "--clock", "sensor", *flags, **more)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
 
 
 class Hand:

@@ -13,7 +13,7 @@ from gestured.core.scene import Scene, Setup
 from gestured.daemon import gatekeeper
 from gestured.daemon.gatekeeper import Gatekeeper
 from tests.core.test_hub import GESTURES, Sure
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import Daemon, Sensor, running
 
 
 @pytest.fixture(scope="module")
@@ -21,9 +21,8 @@ def lasting(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[D
     folder = tmp_path_factory.mktemp("gates")
     config = folder / "gestured.toml"
     config.write_text(f'[sensors.armrest]\n[gates]\nstart = ["seat"]\nsocket = "{folder}/gates.sock"\n')
-    daemon = Daemon.start(folder, model, "--config", config, "--clock", "sensor", "--stale-s", 30)
-    yield daemon
-    daemon.stop()
+    with running(folder, model, "--config", config, "--stale-s", 30) as daemon:
+        yield daemon
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from gestured.daemon.bound import bind_all
 from gestured.daemon.request import Refusal, Verb, parse_request
 from gestured.daemon.sockets import AddressError
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import Daemon, Sensor, running
 from tests.daemon.parts import settings_of
 
 SLOW = ("--stale-s", 30)  # on a busy machine no sensor is stale
@@ -30,10 +30,8 @@ SLOW = ("--stale-s", 30)  # on a busy machine no sensor is stale
 @pytest.fixture(scope="module")
 def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory):
     """One for the verbs that leave no trace that another test could trip over."""
-    daemon = Daemon.start(tmp_path_factory.mktemp("control"), model, "--clock", "sensor", "--flight-recorder", 1, *SLOW)
-    yield daemon
-    assert daemon.stop() == 0
-    assert "Traceback" not in daemon.stderr()
+    with running(tmp_path_factory.mktemp("control"), model, "--flight-recorder", 1, *SLOW) as daemon:
+        yield daemon
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from gestured.model import own_file
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import Model
 from tests.daemon import tiny_model
-from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
+from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of, running
 from tests.small_model import WINDOW, segment
 
 Point = tuple[float, float]
@@ -39,11 +39,9 @@ def lasting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     folder = tmp_path_factory.mktemp("own")
     (folder / CONFIG).touch()
     model = tiny_model.make(folder / MODEL, own=tiny_model.own())
-    flags = ("--config", folder / CONFIG, "--clock", "sensor", "--stale-s", 30)
-    daemon = Daemon.start(folder, model, *flags, env={"STATE_DIRECTORY": str(folder)})
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    flags = ("--config", folder / CONFIG, "--stale-s", 30)
+    with running(folder, model, *flags, env={"STATE_DIRECTORY": str(folder)}) as daemon:
+        yield daemon
 
 
 @pytest.fixture
@@ -59,15 +57,15 @@ def daemon(lasting: Daemon) -> Iterator[Daemon]:
 @pytest.fixture
 def begin(tmp_path: Path, model: Path) -> Iterator[Begin]:
     """Starts daemons with a file for own gestures; no sensor falls silent soon."""
-    running: list[Daemon] = []
+    daemons: list[Daemon] = []
 
     def start(*flags: object, **more: Any) -> Daemon:
         more = {"env": {"STATE_DIRECTORY": str(tmp_path)}} | more
-        running.append(Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, *flags, **more))
-        return running[-1]
+        daemons.append(Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, *flags, **more))
+        return daemons[-1]
 
     yield start
-    for daemon in running:
+    for daemon in daemons:
         assert daemon.stop() == 0, daemon.stderr()
         assert "Traceback" not in daemon.stderr()
 

@@ -15,7 +15,7 @@ from gestured.core.events import Gesture, Provisional
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sinks import OscSink
 from tests.daemon import tiny_model
-from tests.daemon.harness import Client, Daemon, Hand, Sensor
+from tests.daemon.harness import Client, Daemon, Hand, Sensor, running
 from tests.hostile.grammar import TYPES, violations
 
 ALL = (*TYPES, "provisional")
@@ -29,12 +29,9 @@ def early(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def daemon(early: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    daemon = Daemon.start(
-        tmp_path_factory.mktemp("daemon"), early, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--max-sensors", 500
-    )
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    flags = ("--metrics", "127.0.0.1:0", "--max-sensors", 500)
+    with running(tmp_path_factory.mktemp("daemon"), early, *flags) as daemon:
+        yield daemon
 
 
 def said(client: Client, sensor: str, last: int = 1) -> list[str]:
