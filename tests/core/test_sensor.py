@@ -425,24 +425,6 @@ OPEN = {
 }
 
 
-@pytest.mark.parametrize("wait", [0.01, 2.0])
-@pytest.mark.parametrize(
-    ("what", "expected"),
-    [("nothing", []), ("finger", ["silence"]), ("lifted", ["double_tap"]), ("tapped", ["double_tap"]), ("held", [])],
-)
-def test_a_flush_ends_what_is_open(what: str, expected: list[str], wait: float) -> None:
-    stream = frames(*OPEN[what])
-    subject = recognizer(Fake())
-    before = run(subject, stream)
-    t = stream[-1].t + wait
-    events = subject.flush(t)
-    assert [getattr(e, "reason", None) or e.gesture for e in answers(events)] == expected  # type: ignore[union-attr]
-    onsets = [e.id for e in before if isinstance(e, Onset)]
-    assert [e.id for e in before + events if isinstance(e, Release)] == onsets
-    assert [e.id for e in answers(before) + answers(events)] == onsets  # type: ignore[union-attr]
-    assert not subject.front_end.touched and subject.flush(t + 1) == [] and subject.reset() == []
-
-
 @pytest.mark.parametrize("what", sorted(OPEN))
 def test_a_reset_cancels_what_is_open_and_starts_clean(what: str) -> None:
     subject = recognizer(Fake())
@@ -457,32 +439,6 @@ def test_a_reset_cancels_what_is_open_and_starts_clean(what: str) -> None:
     onset, gesture, release = run(subject, later)
     assert isinstance(gesture, Gesture) and gesture.sequence == 1
     assert onset.id == gesture.id == release.id == len(ids[Onset]) + 1  # type: ignore[union-attr]
-
-
-# --- waits
-
-
-def decided_after(stream: Sequence[Frame], **settings: object) -> list[tuple[float, float]]:
-    """Seconds from offset to decision of each segment, and its length."""
-    front_end = FrontEnd(9, 9, **settings)  # type: ignore[arg-type]
-    cuts = [event for frame in stream for event in front_end.push(frame) if isinstance(event, Cut)]
-    return [(cut.decided - cut.segment.offset, cut.segment.offset - cut.segment.onset) for cut in cuts]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_only_a_tap_waits_and_only_for_a_second_one(seed: int) -> None:
-    frame, margin = 1 / 15, 1e-6
-    tapped = frames("quiet for 1500ms", TAP, "quiet for 1s", seed=seed)
-    ((waited, _),) = decided_after(tapped)
-    assert 0.5 <= waited <= 0.5 + 2 * frame + margin
-    ((waited, _),) = decided_after(tapped, wait_for_double_tap=False)
-    assert 0.1 <= waited <= 0.1 + 2 * frame + margin
-    twice = frames("quiet for 1500ms", TAP, "quiet for 250ms", TAP, "quiet for 1s", seed=seed)
-    ((waited, length),) = decided_after(twice)
-    assert 0.1 <= waited <= 0.1 + 2 * frame + margin and 0.37 < length < 0.52
-    assert len(decided_after(twice, wait_for_double_tap=False)) == 2
-    ((waited, _),) = decided_after(frames("quiet for 1500ms", SWIPE, "quiet for 1s", seed=seed))
-    assert 0.1 <= waited <= 0.1 + 2 * frame + margin
 
 
 # --- silences
