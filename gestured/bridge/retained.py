@@ -76,9 +76,11 @@ class Retained:
         prefix, host, gate, version = self._prefix, self._host, self._gate, self._daemon.version
         base = f"gestured/{host}"
         node = f"gestured_{host}"
+        # No other machine's sensor has this id: names may contain "_", but not "/". Most machines' names have no "_".
+        ours = f"{node}{'/' if '_' in host else '_'}{sensor}"
         common = {
             "device": {
-                "identifiers": [f"{node}_{sensor}"],
+                "identifiers": [ours],
                 "name": f"{sensor} on {host}",
                 "manufacturer": "gestured",
                 "model": "tactile sensor",
@@ -89,7 +91,7 @@ class Retained:
         }
         event = {
             "name": "Gesture",
-            "unique_id": f"{node}_{sensor}_gesture",
+            "unique_id": f"{ours}_gesture",
             "state_topic": f"{base}/{sensor}/gesture",
             "event_types": list(gestures),
             "value_template": EVENT,
@@ -99,7 +101,7 @@ class Retained:
         gates = {"state_topic": f"{base}/{sensor}/gates", "availability_topic": f"{base}/availability"}
         listens = {
             "name": "Listens",
-            "unique_id": f"{node}_{sensor}_listens",
+            "unique_id": f"{ours}_listens",
             "value_template": LISTENS,
             "json_attributes_topic": f"{base}/{sensor}/gates",
         }
@@ -107,7 +109,7 @@ class Retained:
         if gate is not None:
             switch = {
                 "name": f"Gate {gate}",
-                "unique_id": f"{node}_{sensor}_gate_{gate}",
+                "unique_id": f"{ours}_gate_{gate}",
                 "command_topic": f"{base}/{sensor}/gate/set",
                 "payload_on": ON,
                 "payload_off": OFF,

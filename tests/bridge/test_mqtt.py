@@ -306,6 +306,19 @@ def test_templates_make_of_an_event_what_home_assistant_expects():
         assert tuple(jinja2.Environment().from_string(each).render(value_json=told) for each in templates) == expected
 
 
+def test_no_two_sensors_of_two_machines_are_one_in_home_assistant():
+    """It takes devices and entities with the same id for one, and both names may contain `_`."""
+    found = []
+    for host, sensor in (("a", "b_c"), ("a_b", "c"), ("car", "armrest")):
+        daemon = known.Daemon(None, None, Counts("mqtt"))
+        daemon.take(HELLO | {"sensors": {sensor: 0}})
+        kept = dict(Retained(daemon, host, "ha", discovers=True).changes())
+        event = json.loads(kept[f"ha/event/gestured_{host}/{sensor}/config"])
+        found.append((*event["device"]["identifiers"], event["unique_id"]))
+    assert found[2] == ("gestured_car_armrest", "gestured_car_armrest_gesture")  # as ever, so that entities stay
+    assert all(one != other for one, other in zip(*found[:2], strict=True))
+
+
 def test_what_was_forgotten_while_the_broker_was_away_is_cleared_when_it_is_back():
     daemon = known.Daemon(None, None, Counts("mqtt"))
     retained = Retained(daemon, "car", "homeassistant", discovers=True)
