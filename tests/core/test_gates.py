@@ -121,6 +121,13 @@ def test_whoever_asks_is_told_of_a_sensor_of_the_scene_before_it_is_heard() -> N
     assert not hub.allow(None, "door", 5.0) and not hub.inhibit("seat", "door", 6.0)
 
 
+def test_whoever_closes_a_gate_again_sets_its_time_anew_for_one_sensor_or_for_all() -> None:
+    hub = Hub(replace(SCENE, sensors={"arm": Setup()}), Sure())
+    for sensor, seconds in (("arm", 60.0), (None, 1.0), ("arm", math.inf), (None, 9.0)):
+        hub.inhibit(sensor, "door", 0.0, seconds)
+        assert hub.gates.of("arm") == {"door": seconds}
+
+
 def test_a_sensor_that_lost_its_place_comes_back_as_silent_as_it_was() -> None:
     hub = Hub(replace(SCENE, max_sensors=1), Sure())
     (_, packet, source) = DRIVE[0]
