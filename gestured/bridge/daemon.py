@@ -83,7 +83,7 @@ class Daemon:
                 self._heard(line["sensors"])
             case "gone":
                 self.hello = {}
-                self._counts.connected("daemon", False, f"no daemon on {line['path']}; waiting for it")
+                self._counts.connected("daemon", False, f"no daemon answers on {line['path']}; waiting for it")
 
     def silent_by(self, gate: str) -> list[str]:
         """The sensors for which that gate is closed."""

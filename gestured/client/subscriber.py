@@ -24,7 +24,7 @@ FIRST_S, LONGEST_S = 0.1, 2.0  # between attempts to connect, doubled each time;
 CHUNK = 65536  # the most bytes of one read
 LINE_BYTES = 4 << 20  # of a line, at most; a hello with all sensors that a daemon can keep has an eighth of these
 PROTOCOL = 1
-GREETING_S = 10.0  # to wait for the hello, which a daemon sends at once
+GREETING_S = 10.0  # to wait for the hello, which a daemon sends at once, and for a status, which comes each second
 SILENT = f"says nothing within {GREETING_S:g} s: it hangs, or this is not its event socket (--socket)"
 LOG = logging.getLogger("gestured")
 
@@ -69,6 +69,7 @@ class Subscriber:
         # A text is passed on as it is, since the daemon's error about a text is clearer than one about its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
         self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""
+        self._alive = types is not None and "status" in types  # whether a daemon that is silent must hang
         self._timeout, self._reconnect, self._say = timeout, reconnect, say
         self._unread: deque[tuple[_Source, bytes]] = deque()
         self._selector = selectors.DefaultSelector()
@@ -155,12 +156,13 @@ class Subscriber:
         for source in self._sources:
             if source.due <= now and source.lines is None:
                 self._call(source, now)
-            elif source.due <= now:
-                self._gone(source, Unreachable(f"the daemon on {source.path} {SILENT}"))
         until = min(end, *(source.due for source in self._sources))
-        for key, _ in self._selector.select(None if until == math.inf else max(until - now, 0.0)):
-            if key.data is not None:
-                self._receive(key.data)
+        said = [key.data for key, _ in self._selector.select(None if until == math.inf else max(until - now, 0.0))]
+        for source in self._sources:
+            if source in said:
+                self._receive(source)
+            elif source.due <= now and source.lines is not None:
+                self._gone(source, Unreachable(f"the daemon on {source.path} {SILENT}"))
 
     def _call(self, source: "_Source", now: float) -> None:
         self._pid = os.getpid()  # the process that the connections belong to
@@ -206,9 +208,10 @@ class Subscriber:
                 raise Unsubscribed(refusal)
             self._gone(source, Unreachable(refusal))
             return None
+        source.due = time.monotonic() + GREETING_S if self._alive else math.inf
         if not source.hello:
             _check_hello(text, message, source.path)
-            source.hello, source.due, source.wait_s, source.fault = message, math.inf, FIRST_S, ""
+            source.hello, source.wait_s, source.fault = message, FIRST_S, ""
         elif words := wrong_field(message):
             self._say(f"a line of the daemon on {source.path} is passed over: {words}")
             return None
@@ -245,6 +248,6 @@ class _Source:
     lines: Lines | None = None
     hello: dict[str, Any] = field(default_factory=dict)  # the hello of this connection; empty until it came
     begun: bytearray = field(default_factory=bytearray)  # the part of a line whose end has not come yet
-    due: float = 0.0  # monotonic s: when to connect, or by when the hello must have come
+    due: float = 0.0  # monotonic s: when to connect, by when the next line must have come
     wait_s: float = FIRST_S  # how long to wait after the next failure
     fault: str = ""  # why it is not connected (any more)

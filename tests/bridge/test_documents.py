@@ -121,4 +121,4 @@ def test_systemd_is_told_how_a_bridge_is(bridge, broker, daemon: Daemon, tmp_pat
             words = systemd.recv(4096).decode()
             assert words.startswith("READY=1\nSTATUS=")
         assert words.partition("STATUS=")[2].startswith("connected: " if there else "waiting: ")
-        assert there or f"no daemon on {path}; waiting for it" in words
+        assert there or f"no daemon answers on {path}; waiting for it" in words

@@ -9,6 +9,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ import pytest
 from gestured.bridge import daemon as known
 from gestured.bridge.counts import Counts
 from gestured.bridge.retained import Retained
+from gestured.client.subscriber import Subscriber
 from tests.bridge.conftest import Broker, Process, emit, guarded, page, wait
 from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import HELLO, FakeDaemon
@@ -494,6 +496,23 @@ def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
     fake.accept(HELLO | {"instance": "b"})
     fake.say(gesture(1))
     assert listener.events(1)[0]["instance"] == "b"
+
+
+def test_a_daemon_that_hangs_is_gone_until_it_goes_on(daemon: Daemon, monkeypatch):
+    """Nobody restarts it where no watchdog does, and its connection stays open."""
+    monkeypatch.setattr("gestured.client.subscriber.GREETING_S", 2.0)
+    source = Subscriber(daemon.socket, types=["gesture", "status"], timeout=known.NOTICE_S)
+    late = threading.Timer(DEADLINE_S, source.close)
+    late.start()
+    lines = known.follow(source, Counts("mqtt"))
+    try:
+        for kind, then in (("status", signal.SIGSTOP), (known.GONE, signal.SIGCONT), ("hello", signal.SIGCONT)):
+            assert any(line["type"] == kind for line in lines), f"no line {kind!r} comes"
+            daemon.signal(then)
+    finally:
+        daemon.signal(signal.SIGCONT)
+        late.cancel()
+        source.close()
 
 
 @pytest.mark.parametrize("ahead", [-30.0, 30.0])
