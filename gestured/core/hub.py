@@ -187,7 +187,13 @@ class Hub:
     def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
         """Go on in another scene; what was learned of a sensor stays if it still holds. ValueError as for a new hub."""
         facts = self.wait(now)  # a contact that is over is answered by the scene before
+        unheard = [name for name in {**self.scene.sensors, **scene.sensors} if name not in self._sensors]
+        armed = {name for name in unheard if self.scene.arming_of(name) is not None}
         self._set(scene, classifier)
+        for name in unheard:
+            gate = self._unheard(name, now).gate
+            if gate is not None and (name in armed) != (gate.armed is not None):
+                facts.append(gate)
         for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)
             sensor.follow(facts, asked=self._follows(sensor.name))

@@ -121,6 +121,16 @@ def test_whoever_asks_is_told_of_a_sensor_of_the_scene_before_it_is_heard() -> N
     assert not hub.allow(None, "door", 5.0) and not hub.inhibit("seat", "door", 6.0)
 
 
+@pytest.mark.parametrize("names", [("arm",), ()])
+def test_a_reload_without_arming_tells_of_a_sensor_of_the_scene_before_it_is_heard(names: tuple[str, ...]) -> None:
+    """Whether or not the configuration still names it."""
+    hub = Hub(replace(SCENE, sensors={"arm": Setup()}, arming=Arming("double_tap")), Sure())
+    after = replace(SCENE, sensors=dict.fromkeys(names, Setup()))
+    assert gates(hub.listening(0.0)) == [("arm", False, ())]
+    assert gates(hub.change(after, Sure(), 1.0)) == [("arm", None, ())]
+    assert not hub.change(after, Sure(), 2.0)
+
+
 def test_whoever_closes_a_gate_again_sets_its_time_anew_for_one_sensor_or_for_all() -> None:
     hub = Hub(replace(SCENE, sensors={"arm": Setup()}), Sure())
     for sensor, seconds in (("arm", 60.0), (None, 1.0), ("arm", math.inf), (None, 9.0)):
