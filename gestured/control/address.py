@@ -7,8 +7,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from gestured.client.address import SOCKET_PATH, control_beside, find_control, find_socket, setting
+from gestured.client.address import SOCKET_PATH, control_beside, find_control, find_socket, running, setting
 from gestured.client.control import Control
+from gestured.client.lines import Forbidden, Unreachable
 
 LAST_S = 3.0  # how long the last lines of the daemon are waited for after `finish`
 
@@ -68,4 +69,15 @@ def _later(seconds: float, act: Callable[[], object]) -> None:
 
 def connect(args: argparse.Namespace) -> Control:
     """A connection to the daemon that `--control` or `--socket` names. Raises Unreachable."""
-    return Control(control_path(args))
+    path = control_path(args)
+    try:
+        return Control(path)
+    except Forbidden:
+        raise
+    except Unreachable as error:
+        others = running()
+        if not others or path in others:
+            raise
+        named = ", ".join(str(other.with_suffix(".sock")) for other in others)
+        said = f"one runs on {named}: if its socket or control setting was changed since its start, restart it"
+        raise Unreachable(f"{error}; {said}") from None

@@ -179,6 +179,12 @@ def test_doctor_names_a_daemon_that_runs_with_another_socket(ctl, run, daemon: D
     assert not any("start gestured" in found["what"] or "in use" in found["what"] for found in said)
 
 
+def test_a_reload_after_a_change_of_the_socket_says_that_it_needs_a_restart(run, daemon: Daemon, monkeypatch) -> None:
+    monkeypatch.setenv("GESTURED_SOCKET", str(daemon.socket.with_name("other.sock")))  # as systemd's reload reads it
+    status, _, err = run("reload")
+    assert status == 1 and err.count("\n") == 1 and str(daemon.socket) in err and "restart it" in err
+
+
 def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve, monkeypatch) -> None:
     monkeypatch.setattr("gestured.control.doctor.LOOK_S", 0.2)
     daemon = serve()
