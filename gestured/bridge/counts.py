@@ -3,12 +3,14 @@
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 from gestured.bridge.options import BridgeError
 from gestured.client.notify import notify
 from gestured.client.say import say, say_json
 from gestured.core.address import Address
+from gestured.core.errors import GesturedError
 
 HELP = {
     "events": "Events of the daemon, by what became of them",
@@ -63,7 +65,8 @@ class Counts:
         """Print once that the bridge works, as a line of JSON on standard output."""
         if not self._ready:
             self._ready = True
-            say_json({"type": "ready", "bridge": self.bridge, **where, "metrics": self._metrics})
+            with suppress(GesturedError, BrokenPipeError):  # events go on, though nobody reads this or the disk is full
+                say_json({"type": "ready", "bridge": self.bridge, **where, "metrics": self._metrics})
 
     def serve(self, address: Address | None) -> None:
         """Answer /metrics in a thread of its own, if an address is given. Raises BridgeError."""

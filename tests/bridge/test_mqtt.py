@@ -363,6 +363,19 @@ def test_what_others_retain_is_neither_read_nor_cleared(bridge, broker, listen, 
     assert "Received SUBSCRIBE from gestured-car" not in said
 
 
+def test_a_bridge_goes_on_where_nobody_reads_that_it_is_ready(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "gestured/#")
+    process = begin(bridge, at, fake)
+    process.process.stdout.close()
+    fake.accept()
+    listener.until("gestured/car/availability", "online")
+    for n in range(1, 11):  # the first of them come before it is ready
+        fake.say(gesture(n))
+        assert listener.events(1)[0]["sequence"] == n
+    assert process.stop() == 0
+
+
 def test_a_broker_is_told_to_send_no_large_message(bridge, fake):
     """What is read whole before it can be looked at is bounded by the other side."""
     with socket.create_server(("127.0.0.1", 0)) as server:
