@@ -36,6 +36,7 @@ class Subscriber:
     event, a `hello` line is not: the attribute `hello` is that of the daemon whose event was given last, and `path` is
     its socket. When a daemon has started again, `instance` in its `hello` is another, and `sequence` counts anew. A
     line in which a field is missing, or has another type than the protocol says, is skipped and reported to `say`.
+    If `status` is among the types, a daemon that says nothing for ten seconds hangs, and counts as gone.
 
     One thread iterates; any thread may `close` it, which ends the iteration.
     """
