@@ -49,26 +49,31 @@ class Lived:
     """Contacts of tapes in which nobody made a gesture."""
 
     samples: Samples  # of the kind EVERYDAY; `people` are places in `hours`
-    hours: NDArray[np.float64]  # (U,) h, of each tape and sensor; with only one, of equal parts of it
+    hours: NDArray[np.float64]  # (U,) h on all sensors of each tape; with only one tape, of equal parts of it
     unit: str  # what each of these hours is of: "tapes", or "parts of one tape"
 
 
 def own_hours(paths: Sequence[Path], grid: tuple[int, ...]) -> Lived:
     """Read and cut tapes. Raises RecordingError or GesturedError if nothing can be learned from them."""
-    found: list[tuple[list[Sample], NDArray[np.float64], float]] = []
+    found: list[tuple[list[Sample], list[float], float]] = []
     for path in paths:
-        for life in recorded(path):
+        contacts, places, seconds = list[Sample](), list[float](), 0.0
+        for life in recorded(path):  # one person may touch all its sensors at once, so they are one unit
             assert life.setup.grid is not None
             if life.setup.grid != grid:
                 here, others = ("x".join(map(str, shape)) for shape in (life.setup.grid, grid))
                 raise RecordingError(f"{path}: expected the grid {others} of the recordings, found {here}")
-            found.append(_contacts(life))
+            more, onsets, lasted = _contacts(life)
+            contacts += more
+            places += (onsets * GROUPS / max(lasted, 1.0)).tolist()
+            seconds += lasted
+        found.append((contacts, places, seconds))
     unit = "tapes"
     if len(found) == 1:
-        unit, (contacts, onsets, seconds) = "parts of one tape", found[0]
-        part = np.minimum(onsets * GROUPS / max(seconds, 1.0), GROUPS - 1).astype(np.int64).tolist()
+        unit, (contacts, places, seconds) = "parts of one tape", found[0]
+        parts = [min(int(place), GROUPS - 1) for place in places]
         found = [
-            ([one for one, of in zip(contacts, part, strict=True) if of == k], onsets, seconds / GROUPS)
+            ([one for one, of in zip(contacts, parts, strict=True) if of == k], [], seconds / GROUPS)
             for k in range(GROUPS)
         ]
     hours = np.array([seconds for _, _, seconds in found]) / HOUR_S

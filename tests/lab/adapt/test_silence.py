@@ -21,18 +21,26 @@ from tests.lab.adapt.recorded import cut_gestures
 TAUGHT = [name for name in GESTURES if name != "swipe_up"]
 
 
-def tape(path: Path, kinds: Sequence[str], grid: Sequence[int] = (9, 9), seed: int = 0, silence_s: float = 0.0) -> Path:
-    """A tape of a sensor on which these kinds happened, one after the other; it is silent before the last half."""
+def tape(
+    path: Path,
+    kinds: Sequence[str],
+    grid: Sequence[int] = (9, 9),
+    seed: int = 0,
+    silence_s: float = 0.0,
+    names: Sequence[str] = ("arm",),
+) -> Path:
+    """A tape of sensors on which these kinds happened, one after the other; they are silent before the last half."""
     settings = {"model": "cnn_lstm", "fallback": [], "grid": list(grid), "sensors": {}}
     told = {"settings": settings, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
-    sensor, form, now, n = SimulatedSensor.nominal(day=70), Form("arm"), 1.0, 0
+    sensor, forms, now, n = SimulatedSensor.nominal(day=70), [Form(name) for name in names], 1.0, 0
     with Writer(path, told, 1 << 28) as writer:
         for k, kind in enumerate(kinds):
             now += silence_s if k == len(kinds) // 2 else 0.0
             take = gesture_take(kind, Participant(600 + seed), sensor, generator(32, seed, k))
             for frame, t in zip(take.frames, take.times - take.times[0] + 1 / 15, strict=True):
-                packet = form.packet(Frame(0.0, frame[: grid[0], : grid[1]]), n, 0.0)
-                writer.packet(10**18 + round((now + t) * 1e9), "127.0.0.1:5", packet)
+                for form in forms:
+                    packet = form.packet(Frame(0.0, frame[: grid[0], : grid[1]]), n, 0.0)
+                    writer.packet(10**18 + round((now + t) * 1e9), "127.0.0.1:5", packet)
                 n += 1
             now += float(take.times[-1] - take.times[0]) + 1 / 15
     return path
@@ -107,9 +115,24 @@ def test_a_model_that_says_more_than_the_one_in_use_is_no_better() -> None:
 
 
 @pytest.mark.usefixtures("short")
-@pytest.mark.parametrize("silence_s", [0.0, 3600.0])
-def test_a_single_tape_is_held_out_in_parts(silence_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("silence_s", "names"), [(0.0, ["arm"]), (3600.0, ["arm"]), (0.0, ["left", "right"])])
+def test_a_single_tape_is_held_out_in_parts(
+    silence_s: float, names: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(silence, "ABSENT_S", 1.0)  # what a silence counts for, on a tape of a minute
-    lived = silence.own_hours([tape(tmp_path / "day.mcap", ["one_tap"] * 24, silence_s=silence_s)], (9, 9))
+    path = tape(tmp_path / "day.mcap", ["one_tap"] * 24, silence_s=silence_s, names=names)
+    lived = silence.own_hours([path], (9, 9))
     assert lived.unit == "parts of one tape" and len(lived.hours) == 5
-    assert np.ptp(lived.hours) == 0 and np.bincount(lived.samples.people, minlength=5).min() >= 4
+    assert np.ptp(lived.hours) == 0 and np.bincount(lived.samples.people, minlength=5).min() >= 4 * len(names)
+
+
+@pytest.mark.usefixtures("short")
+def test_the_sensors_of_a_tape_are_not_held_out_from_each_other(tmp_path: Path) -> None:
+    """One person may be on both at once."""
+    paths = [
+        tape(tmp_path / f"{len(names)}.mcap", ["one_tap"] * 16, names=names) for names in (["left", "right"], ["arm"])
+    ]
+    lived = silence.own_hours(paths, (9, 9))
+    assert lived.unit == "tapes" and lived.hours[0] == pytest.approx(2 * lived.hours[1])
+    both, one = np.bincount(lived.samples.people)
+    assert both == 2 * one
