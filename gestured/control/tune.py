@@ -5,7 +5,6 @@ import dataclasses
 import json
 from collections.abc import Iterator
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from gestured.control.tuning import ENOUGH, Counts, Played, Tuned, tune
 from gestured.core import messages
 from gestured.core.errors import RecordingError
 from gestured.core.points import USUAL
-from gestured.core.sensor import ABSENT_S
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.record.check import UNNAMED
@@ -97,9 +95,7 @@ def play(path: Path, model: Model, played: Played) -> None:
             one.label = one.label if one.label in (*model.gestures, NONE) else UNNAMED
         played.add(performed, events, partial(replay.knew, "recording"))
     else:
-        # A sensor that sends only while it is touched counts as present in pauses, but in none longer than ABSENT_S.
-        steps = (after.t_ns - before.t_ns for before, after in pairwise(source.tape.packets))
-        played.seconds += sum(min(step / 1e9, ABSENT_S) for step in steps)
+        played.seconds += sum(sensor.seconds for sensor in replay.played.values())
         played.add([], events)
 
 

@@ -20,6 +20,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.own import Examples, from_dict
 from gestured.core.scene import Scene
+from gestured.core.sensor import ABSENT_S
 from gestured.record.tape import Tape
 from gestured.record.tape_reader import read
 
@@ -81,13 +82,17 @@ class Mute(Classifier):
 
 @dataclass
 class Played:
-    """The times from which on the idle state of a replay's sensor was known, in s since the tape's first packet."""
+    """How long a sensor of a replay sent, and from when on it was known, in s since the tape's first packet."""
 
+    seconds: float = 0.0  # pauses count as ABSENT_S at most: a sensor may send only while it is touched
+    _last: float = math.inf
     _learned: list[tuple[float, float]] = field(default_factory=list)  # when it was new, and when it was known
 
     def see(self, taken: Taken) -> None:
         """Remember one more frame that was used."""
         t = taken.frame.t
+        self.seconds += min(max(t - self._last, 0.0), ABSENT_S)
+        self._last = t
         if taken.new:
             self._learned.append((t, math.inf))
         if taken.ready and self._learned[-1][1] == math.inf:

@@ -170,8 +170,18 @@ def test_a_night_in_which_no_packet_came_shows_nothing(models: dict[bool, Model]
     later = [(t + 36_000.0, packet, source) for t, packet, source in test_gates.DRIVE]
     path = test_hub.write(tmp_path / "night.mcap", [*test_gates.DRIVE, *later])
     play(path, models[False], played := Played())
-    assert played.seconds == pytest.approx(2 * (test_gates.DRIVE[-1][0] - test_gates.DRIVE[0][0]) + ABSENT_S)
+    drive = test_gates.DRIVE[-1][0] - test_gates.DRIVE[0][0]
+    assert played.seconds == pytest.approx(2 * (2 * drive + ABSENT_S), rel=0.001)  # of two sensors
     assert len(played.said) == 12
+
+
+def test_an_hour_of_a_tape_is_an_hour_of_each_of_its_sensors(models: dict[bool, Model], tmp_path: Path) -> None:
+    """As in the model's own figures, and in those of `gestured-lab everyday`."""
+    alone = [one for one in test_gates.DRIVE if b"/seat/" not in one[1]]
+    one, two = Played(), Played()
+    for name, packets, played in (("one", alone, one), ("two", test_gates.DRIVE, two)):
+        play(test_hub.write(tmp_path / f"{name}.mcap", packets), models[False], played)
+    assert one.said == two.said and two.seconds == pytest.approx(2 * one.seconds, rel=0.02)
 
 
 def taps(path: Path, *, onset: int | None, label: str = "one_tap") -> Path:
