@@ -127,6 +127,17 @@ def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.Cap
     assert found["contacts"] == onsets
 
 
+def test_tapes_of_one_name_in_two_folders_are_not_one_person(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
+    paths = [tmp_path / folder / "day.mcap" for folder in ("monday", "tuesday")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_bytes((ROOT / "docs" / "demo.mcap").read_bytes())
+    assert said(capsys, "--recordings", *paths)["people"] == 2
+
+
 @pytest.mark.parametrize("lived", [lambda: lived(FIRST, SHORT_S), lambda: foreign_lived("nominal", FIRST)])
 def test_the_hours_of_either_generator_carry_their_truth(lived: Any) -> None:
     life = lived()

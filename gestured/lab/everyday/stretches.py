@@ -82,4 +82,4 @@ def _tape(path: Path) -> Iterator[Stretch]:
         raise RecordingError(f"{path}: holds no frames that a daemon could use")
     for name, frames in used.items():
         setup = Setup(maker.scene.grid_of(name), maker.scene.setup(name).mounting)
-        yield Stretch(f"{shown(path.stem)}: {name}", path.stem, frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
+        yield Stretch(f"{shown(path.stem)}: {name}", str(path), frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
