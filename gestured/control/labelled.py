@@ -13,6 +13,7 @@ from gestured.control.show import STOPWATCH_S
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.core.scene import Scene
+from gestured.core.sensor import ABSENT_S
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION, UNNAMED
@@ -43,7 +44,7 @@ class Labelled:
         self._found = found = recording.read(path)
         spans = [found.times_of(g) for g in range(len(found))]
         lengths = [float(times[-1] - times[0]) for times in spans]
-        self.seconds = sum(lengths)
+        self.seconds = sum(float(np.minimum(np.diff(times), ABSENT_S).sum()) for times in spans)
         self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
         begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
         # (G,) s, as played
