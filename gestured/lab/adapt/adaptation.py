@@ -2,8 +2,9 @@
 
 Each group of people is judged by networks that have not learned from it, with a decision that was fitted on the others.
 Training changes confidences more than the order of the answers, so both models are compared at thresholds at which they
-are wrong equally often. The threshold is the only number that is chosen on the answers by which it is judged. The model
-that is written has learned from all people; its decision and threshold are fitted on all answers to held-out people.
+are wrong equally often: as often as the old model at its usual operating point. The threshold is the only number that
+is chosen on the answers by which it is judged. The model that is written has learned from all people; its decision and
+threshold are fitted on all answers to held-out people.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,12 +16,14 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from gestured.core.points import USUAL
 from gestured.lab import decide
 from gestured.lab.adapt.learning import Course, Simulated, between, classes_of, learned, opinions
 from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.weights import Base
 from gestured.lab.decide import refitted
 from gestured.lab.early import Foretold
+from gestured.lab.everyday.hours import Least, points_of
 from gestured.lab.intervals import interval
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples
@@ -33,25 +36,28 @@ class Answers:
     """Answers to samples, one row each, and rows without an answer for gestures that were never cut out."""
 
     known: NDArray[np.bool_]  # (N,) a gesture of the model was performed
-    right: NDArray[np.bool_]  # (N,) the best score is that gesture's
+    named: NDArray[np.int64]  # (N,) the gesture with the best score; 0 if nothing was cut out
+    right: NDArray[np.bool_]  # (N,) it is the one that was performed
     confidence: NDArray[np.float64]  # (N,) -1 if nothing was cut out
     unit: NDArray[np.int64]  # (N,) the person, session or stretch, over which intervals are drawn
 
     @classmethod
     def of(cls, samples: Samples, said: decide.Answers, missed: NDArray[np.int64]) -> "Answers":
         """The answers `said` to samples; `missed` (M,) has the units of gestures that were never cut out."""
-        lost = np.zeros(len(missed))
-        known = samples.labels != NONE
+        lost = np.zeros(len(missed), np.int64)
+        known, named = samples.labels != NONE, said[0].argmax(axis=1)
         return cls(
             np.concatenate([known, lost == 0]),
-            np.concatenate([known & (said[0].argmax(axis=1) == classes_of(samples)), lost > 0]),
+            np.concatenate([named, lost]),
+            np.concatenate([known & (named == classes_of(samples)), lost > 0]),
             np.concatenate([decide.confidence(said), lost - 1]),
             np.concatenate([samples.people, missed]),
         )
 
-    def shares(self, least: float) -> "Shares":
+    def shares(self, least: Least) -> "Shares":
         """The shares, with answers published from a confidence of `least` on."""
-        published = self.confidence >= least
+        each = [least[name] if isinstance(least, Mapping) else least for name in GESTURES]
+        published = self.confidence >= np.array(each)[self.named]
         known, others = self.known, ~self.known
         right, wrong = published & self.right, published & known & ~self.right
         low_high = [
@@ -163,13 +169,13 @@ class Adapted:
 
 def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
     """Adapt a model to own recordings, and judge both models."""
-    start, least = base.judged, base.model.threshold
+    start, least = base.judged, points_of(base.model)[USUAL]
     new = settled(start, least, own, takes, course)
     before, after = _nominal(start, least, takes), _nominal(new.judged, new.least, takes)
     return Adapted(new, _early(new, takes), before, after)
 
 
-def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Course) -> Settled:
+def settled(start: Judged, least: Least, own: Own, takes: Simulated, course: Course) -> Settled:
     """Train networks that publish from `least` on further, with own recordings."""
     groups = held_out(own)
     ends = [
@@ -248,7 +254,7 @@ def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
     return Foretold.sessions(asked).rule("net", new.judged, new.least)
 
 
-def _nominal(judged: Judged, least: float, takes: Simulated) -> Shares:
+def _nominal(judged: Judged, least: Least, takes: Simulated) -> Shares:
     found = opinions(judged, takes.nominal).answers(judged.decision, judged.verifier)
     return Answers.of(takes.nominal, found, takes.missed).shares(least)
 

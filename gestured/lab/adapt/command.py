@@ -152,9 +152,9 @@ def _tell(own: Own, found: Adapted) -> None:
     say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
     for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
-    say(f"threshold {new.least:.3f}, at which no more are wrong than before", WORTH[new.groups.unit])
+    say(f"threshold {new.least:.3f}, at which no more are wrong than before at normal", WORTH[new.groups.unit])
     say(
-        "the model has no operating points: every strictness takes this threshold, which may be laxer than normal was",
+        "the model has no operating points: every strictness takes this threshold, whatever is false at it elsewhere",
         "(gestured-lab everyday counts what is false, gesturectl tune proposes other thresholds)",
     )
 

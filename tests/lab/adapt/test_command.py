@@ -14,8 +14,11 @@ import pytest
 
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
+from gestured.lab.adapt.material import own_recordings
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.cli import main
+from gestured.lab.decide import confidence
+from gestured.lab.evaluate import model_answers
 from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import KEY, origins, said
 from gestured.model.opening import open_model
@@ -109,6 +112,22 @@ def test_a_sensor_that_models_do_not_know_is_learned(run: Run, tmp_path: Path) -
     before, after = found["before"]["own"], found["after"]["own"]
     assert after["right"]["share"] >= before["right"]["share"] + 0.1
     assert after["wrong"]["share"] <= before["wrong"]["share"]
+
+
+@pytest.mark.timeout(300)
+def test_the_old_model_is_judged_at_its_usual_operating_point(run: Run, tmp_path: Path) -> None:
+    """As whoever runs it does; its one threshold is used by no strictness."""
+    path = sluggish(tmp_path)
+    _, out, _ = run(path, "--out", "my.onnx", "--base", "cnn_lstm", "--steps", "1", "--json")
+    model, own = open_model("cnn_lstm"), own_recordings([path])
+    said, right = model_answers(model, own.samples), dict.fromkeys(("normal", "one"), 0)
+    assert model.points is not None
+    for sure, label, best in zip(confidence(said), own.samples.labels, said[0].argmax(axis=1), strict=True):
+        if GESTURES[best] == label:
+            right["normal"] += bool(sure >= model.points["normal"].thresholds[GESTURES[best]])
+            right["one"] += bool(sure >= model.threshold)
+    before = json.loads(out)["before"]["own"]["right"]["share"]
+    assert before == pytest.approx(right["normal"] / own.performed, abs=1e-4) and right["normal"] < right["one"]
 
 
 def test_where_it_is_no_better_nothing_is_written(run: Run, tmp_path: Path) -> None:
