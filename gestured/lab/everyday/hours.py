@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -65,6 +65,8 @@ def hear(
     sensor = Sensor("lab", scene, first)
     sensor.foresee(asked=True)
     meant = [act for act in life.meant if act.label in first.gestures]
+    own = [act for act in life.meant if act.label not in first.gestures]  # gestures of the user's own are enrolled
+    life = replace(life, meant=meant, unnamed=[*life.unnamed, *own])
     heard = Heard(life.place, life.person, 0, meant, {model.name: [] for model in models})
     began: float | None = None
     last, absent_s, known, onsets = 0.0, 0.0, False, 0
@@ -81,7 +83,7 @@ def hear(
         _take(heard, told, life, models, published=published)
     _take(heard, sensor.flush(last + 5.0), life, models, published=published)
     heard.seconds = last - (last if began is None else began) - absent_s
-    heard.contacts = max(onsets - len(meant), 0) if life.contacts is None else life.contacts
+    heard.contacts = max(onsets - len(meant) - len(life.unnamed), 0) if life.contacts is None else life.contacts
     return heard
 
 
@@ -98,24 +100,25 @@ def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Mo
     answer: Gesture | Unknown | None = None
     for one in told:
         if isinstance(one, Provisional):
-            heard.provisional += _whose(one.gesture, one.onset, one.decided, heard.meant, life.taps) is None
+            heard.provisional += _whose(one.gesture, one.onset, one.decided, life)[1]
         elif isinstance(one, Gesture | Unknown):
             answer = one
         elif isinstance(one, Decided) and not (isinstance(answer, Unknown) and (published or answer.reason == "hole")):
             for model in models:
                 scores = one.scores if model is models[0] else model.classify(one.segment)
                 name = model.gestures[int(scores.values.argmax())]
-                act = _whose(name, one.segment.onset, one.segment.offset, heard.meant, life.taps)
-                if act is None and whose(one.segment.onset - ASIDE_S, one.segment.offset + ASIDE_S, life.unnamed):
-                    continue
-                heard.said[model.name].append(Said(name, scores.confidence, act))
+                act, nobodys = _whose(name, one.segment.onset, one.segment.offset, life)
+                if act is not None or nobodys:
+                    heard.said[model.name].append(Said(name, scores.confidence, act))
 
 
-def _whose(
-    gesture: str, onset: float, offset: float, meant: list[Performed], taps: list[Performed]
-) -> Performed | None:
-    """The gesture that was meant then; if none was, and the answer is a tap, the tap that nobody meant."""
-    return whose(onset, offset, meant) or (whose(onset, offset, taps) if gesture in TAPS else None)
+def _whose(gesture: str, onset: float, offset: float, life: Stretch) -> tuple[Performed | None, bool]:
+    """The gesture that was meant then; if none was, and the answer is a tap, the tap that nobody meant.
+
+    And whether there was neither, nor a touch of which nobody knows what it was.
+    """
+    act = whose(onset, offset, life.meant) or (whose(onset, offset, life.taps) if gesture in TAPS else None)
+    return act, act is None and whose(onset - ASIDE_S, offset + ASIDE_S, life.unnamed) is None
 
 
 FEW = 5  # people; an interval over fewer says nothing
