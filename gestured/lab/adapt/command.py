@@ -99,10 +99,13 @@ def _write(found: Adapted | Quieter, out: Path, facts: Facts, cache: Path) -> No
 
 
 def _learned_from(base: Base, recordings: list[Path]) -> list[dict[str, Any]]:
-    """All that the new model learns from. Raises GesturedError if its base has learned from the same recordings."""
+    """All that the new model learns from. Raises GesturedError if its base has learned from the same files or people.
+
+    A pseudonym without a consent may be another person's, as those of public data are.
+    """
     before, new = json.loads(base.model.properties.get(KEY, "[]")), origins(recordings)
     for old, one in product(before, new):
-        if old["sha256"] == one["sha256"] or old.get("consents", {}).items() & one["consents"].items():
+        if old["sha256"] == one["sha256"] or old.get("consents", {}).keys() & one["subjects"]:
             raise GesturedError(
                 f"--base: {base.model.name} has learned from {old['file']}, so that nobody in {one['file']} can be "
                 "held out; expected the model that it was made of, and all recordings"
