@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client.say import say, tell
+from gestured.client.values import each_once
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.store import compact, join_recordings, touched
 from gestured.record.arrays import write
@@ -53,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     """Import files; what cannot be used is reported and counted. Raises GesturedError if nothing can be written."""
     if args.out.exists():
         raise GesturedError(f"--out: {args.out} is there already; expected a new file")
+    each_once(args.files)
     parts: list[Recordings] = []
     left: list[str] = []
     refused: list[str] = []

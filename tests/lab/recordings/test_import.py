@@ -109,6 +109,9 @@ def test_where_nothing_is_good_nothing_is_written(tmp_path: Path, capsys: pytest
     status, text, err = run(capsys, *flags, tmp_path / "none.csv", "--out", out)
     assert (status, text) == (1, f"{tmp_path / 'none.csv'}: cannot be read: No such file or directory\n")
     assert "nothing could be imported" in err
+    good = written(tmp_path / "good.csv", csv_lines(take()))
+    status, text, err = run(capsys, *flags, good, good, "--out", out)
+    assert (status, text) == (1, "") and "good.csv: expected each file once" in err
     assert not out.exists()
     out.write_text("somebody's")
     assert run(capsys, *flags, written(tmp_path / "a.csv", csv_lines(take())), "--out", out)[0] == 1
