@@ -103,9 +103,11 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     if problem["type"] == "missing":
         return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":
-        known = _keys_at(place)
-        near = _near(str(place[-1]), known)
+        known, name = _keys_at(place), str(place[-1])
+        near = _near(name, known)
         hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
+        if len(place) > 1 and name in FLAGS:  # in TOML all that stands below a table's title is part of the table
+            hint = f"expected {name} above the first [table] of the file"
         said = f"unknown key, {hint}"
     elif problem["type"] in ("model_type", "dict_type"):
         said = f"expected a table [{key}]"

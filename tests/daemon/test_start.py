@@ -198,6 +198,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ("[sensors.'arm rest']", ("'arm rest'", "expected a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")),
         ("[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
         ("[addresses]\ntrajectory = '/{sensor}/pressure'", ("gestured.toml): trajectory: expected an address that",)),
+        ("[gestures.one_tap]\nthreshold = 0.8\ntouch = true", ("one_tap.touch", "touch above the first [table]")),
         ("[sensors.arm.arming]\nby = 'a'\nsecond = 3", ("sensors.arm.arming.second", "did you mean seconds")),
         ("[sensors.arm.zones.a]\nat = [0, 0, 1, 1]\ngesture = []", ("zones.a.gesture", "did you mean gestures?")),
         (f"[sensors.arm.zones]\n{TWO}", ("sensors.arm", "zones.a at", "zones.b at", "overlap, expected")),
