@@ -76,7 +76,8 @@ class Retained:
         prefix, host, gate, version = self._prefix, self._host, self._gate, self._daemon.version
         base = f"gestured/{host}"
         node = f"gestured_{host}"
-        # No other machine's sensor has this id: names may contain "_", but not "/". Most machines' names have no "_".
+        # Names of machines and sensors may contain "_", so two pairs joined by it could be one id; none contains "/".
+        # Sensors of a machine without "_" in its name keep the ids that they have always had.
         ours = f"{node}{'/' if '_' in host else '_'}{sensor}"
         common = {
             "device": {

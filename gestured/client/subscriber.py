@@ -70,7 +70,8 @@ class Subscriber:
         # A text is passed on as it is, since the daemon's error about a text is clearer than one about its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
         self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""
-        self._alive = types is not None and "status" in types  # whether a daemon that is silent must hang
+        # Whether a daemon that says nothing must hang: one that is asked for its status tells it each second.
+        self._alive = types is not None and "status" in types
         self._timeout, self._reconnect, self._say = timeout, reconnect, say
         self._unread: deque[tuple[_Source, bytes]] = deque()
         self._selector = selectors.DefaultSelector()
@@ -249,6 +250,6 @@ class _Source:
     lines: Lines | None = None
     hello: dict[str, Any] = field(default_factory=dict)  # the hello of this connection; empty until it came
     begun: bytearray = field(default_factory=bytearray)  # the part of a line whose end has not come yet
-    due: float = 0.0  # monotonic s: when to connect, by when the next line must have come
+    due: float = 0.0  # monotonic s: when to connect, or by when the next line must have come
     wait_s: float = FIRST_S  # how long to wait after the next failure
     fault: str = ""  # why it is not connected (any more)

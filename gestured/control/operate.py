@@ -69,7 +69,7 @@ def _add_gates(commands: Commands) -> None:
         help="close a gate, so that a sensor is silent",
         description="Close a gate of a sensor, or of all. While any of its gates is closed, every contact on the\n"
         "sensor is unknown. A gate stays closed until somebody allows it, across reloads too, unless --for\n"
-        "says how long. Closing it again, also with --all, replaces what an earlier --for said.",
+        "says how long. Closing it again, also with --all, replaces the time that an earlier --for set.",
         epilog="examples:\n  gesturectl inhibit --all --gate door\n"
         "  gesturectl inhibit armrest --gate cleaning --for 600",
     )

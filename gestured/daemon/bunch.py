@@ -61,7 +61,7 @@ class Bunches:
             heard.clear()
         sources = [source for _, source in packets]
         before = min([heard.get(source, arrivals[0]) for source in set(sources)], default=0.0)
-        if not held and packets and arrivals[-1] - before < QUIET_S:  # nobody has paused, as nearly always
+        if not held and packets and arrivals[-1] - before < QUIET_S:  # none of these sources has paused, as is usual
             heard.update(zip(sources, arrivals, strict=True))
             return list(packets), list(arrivals)
         others: list[tuple[float, Packet]] = []

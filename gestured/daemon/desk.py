@@ -108,7 +108,7 @@ class Desk:
 
     def _count(self, arrived: Arrived) -> None:
         sensors, taken, lost, duplicates, late, implausible = arrived
-        if len(sensors) == 1:  # as most facts; a Counter costs as much as the rest of this
+        if len(sensors) == 1:  # true of most facts, which need no Counter: it is slow
             labels = {self._metrics.sensor_label(sensors[0]): 1}
         else:
             labels = Counter(self._metrics.sensor_labels(sensors))

@@ -170,4 +170,4 @@ class Metrics:
         """The labels of sensors, in their order."""
         if len(self._named) < NAMED_SENSORS:
             return map(self.sensor_label, sensors)
-        return map(self._named.get, sensors, repeat(OTHER))  # each frame passes here
+        return map(self._named.get, sensors, repeat(OTHER))  # called for each frame, so without a loop of Python

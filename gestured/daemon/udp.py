@@ -298,8 +298,8 @@ class Receiver:
     def _set_anew(self) -> None:
         """Set the alarm anew after a run of the model, by which it would be late otherwise.
 
-        libuv sleeps for as long as was left when it last looked at the clock, which it does not do after a callback
-        but when a timer is set.
+        libuv computes the length of its sleep from its last look at the clock. It does not look after a callback, but
+        whenever a timer is set.
         """
         self._forget_alarm()
         self._expect()

@@ -2,9 +2,8 @@
 
 The percentile bootstrap over six or ten people covers the true value too seldom. Here the spread of a ratio over people
 (linearised, with their number less one) is taken with Student's t, on the logit of a share and on the logarithm of a
-rate. At a share of exactly 0 or 1 the spread is not known, and the rule of three over gestures is narrower than people
-who differ allow: of ten people with 30 gestures each, whose shares correlate by 0.1, it holds a true 0.01 in 0.7 of the
-draws.
+rate. At a share of exactly 0 or 1 the spread over people is not known. The rule of three over gestures stands in for
+it, and is too narrow where people differ and each of them made many gestures.
 """
 
 import math

@@ -30,7 +30,7 @@ class Nature:
     hum: float = 0.0  # of the mains, which beats with the scan
     drift: float = 0.03  # size of a slow wander with periods from 20 s to 8 min
     spread: float = 0.45  # taxels, one standard deviation of the textile's Gaussian blur
-    tail: float = 0.06  # share of a touch that is taken from it; three times as much spreads further, see `sample`
+    tail: float = 0.06  # share that a touch loses; `sampling.sample` says why three times as much spreads
     tail_taxels: float = 1.0
     row_crosstalk: float = 0.012
     column_crosstalk: float = 0.01

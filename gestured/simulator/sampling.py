@@ -62,7 +62,7 @@ def sample(
             field[first:last] += footprint(sensor, contact, at, taxel_x, taxel_y)
             if contact.finger and math.isfinite(sensor.touch_noise):
                 fingers.track(contact, times[first:last] - start, first, sensor, rng)
-    if sensor.tail > 0.0:  # times 3, since what spreads is low: so the peak of a fingertip keeps its height within 6 %
+    if sensor.tail > 0.0:  # three times as much spreads as is taken, so that a fingertip's peak keeps about its height
         down, across = tail_kernel(rows, sensor.tail_taxels), tail_kernel(columns, sensor.tail_taxels)
         field = (1.0 - sensor.tail) * field + 3.0 * sensor.tail * np.matmul(np.matmul(down, field), across.T)
     return field, fingers

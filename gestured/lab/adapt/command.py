@@ -157,7 +157,8 @@ def _tell(own: Own, found: Adapted) -> None:
         say(_row(f"{title} before", before), _row(f"{title} after", after))
     say(f"threshold {new.least:.3f}, at which no more are wrong than before at normal", WORTH[new.groups.unit])
     say(
-        "the model has no operating points: every strictness takes this threshold, whatever is false at it elsewhere",
+        "the model has no operating points: every strictness publishes from this threshold on, and how many gestures",
+        "are false in everyday contact is not known yet",
         "(gestured-lab everyday counts what is false, gesturectl tune proposes other thresholds)",
     )
 
