@@ -179,8 +179,8 @@ class Hub:
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
         """Learn these sensors anew and cancel their open contacts. Raises KeyError for a sensor that is not there."""
         facts = self.wait(now)  # a contact that is over is answered first
-        self._out(now, facts)
         for name in sensors:
+            self._leave(self._sensors[name], now, facts)
             self._sensors[name].restart(now, facts)
         return facts
 
@@ -299,7 +299,8 @@ class Hub:
         change()
         changed = [name for name, closed in before.items() if closed != self.gates.of(name)]
         facts: list[Fact] = [gate for name in changed if (gate := self._unheard(name, now).gate) is not None]
-        for sensor in self._out(now, facts):
+        self._banks.show()  # a gate changes nothing of what a bank knows, so sensors stay there
+        for sensor in self._sensors.values():
             sensor.shut(self.gates.of(sensor.name), now, facts)
         return facts
 

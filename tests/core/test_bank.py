@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gestured.core import bank
 from gestured.core.bank import FEW, Bank
+from gestured.core.events import Gate
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
@@ -109,7 +110,8 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
         waiting = [(packet, SOURCE) for _, packet in packets]
         if n % 7 == 3:
             hub.missed()
-        facts = [
+        facts = [*hub.inhibit(None, "door", now, 0.5)] if n % 20 == 0 else []
+        facts += [
             fact for some in ([waiting] if together else [[one] for one in waiting]) for fact in hub.receive(some, now)
         ]
         for fact in facts + (hub.tick(now) if n % 40 == 39 else hub.wait(now)):
@@ -190,6 +192,19 @@ def test_a_dip_of_a_moment_does_not_keep_sensors_out_of_a_bank(passed: list[bool
         hub.receive([(packet, SOURCE) for packet in packed(PLAIN, values)], k / 15)
         alike.append(passed.count(True))
     assert alike[44] - alike[34] == alike[89] - alike[79] == 10 * EACH
+
+
+def test_a_gate_for_all_and_a_restart_of_one_keep_the_others_in_their_bank(passed: list[bool]) -> None:
+    """With a thousand sensors, to take them out would delay every answer by the time of a frame."""
+    rng, hub = np.random.default_rng(0), Hub(SCENE, Sure())
+    for k in range(60):
+        if k == 55:
+            told = hub.inhibit(None, "door", k / 15)
+            assert [fact.closed for fact in told if isinstance(fact, Gate)] == [("door",)] * len(SETUPS)
+            hub.restart([PLAIN[0]], k / 15)
+            passed.clear()
+        hub.receive([(packet, SOURCE) for packet in packed(PLAIN, rng.normal(100, 2, (EACH, 81)))], k / 15)
+    assert passed == [True] * (5 * (EACH - 1))
 
 
 def test_idle_frames_are_taken_together_though_others_were_lost_before_them(passed: list[bool]) -> None:
