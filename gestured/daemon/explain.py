@@ -1,4 +1,4 @@
-"""`gestured --explain`: what a configuration loads, listens to, computes per frame, leaves out, and why."""
+"""`gestured --explain`: what a configuration loads, listens to, computes, leaves out, and why."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -11,13 +11,12 @@ from gestured.daemon.asked import open_ladder, outputs_of, scene_of
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import TABLES, TITLES, Part, Settings, as_written
-from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use
 
 LOADS, FALLBACKS, INPUT, OUTPUT, THRESHOLDS, COMPUTES, LEAVES, SET_BY = TITLED = (
-    "loads", "falls back on", "listens to", "publishes on", "thresholds", "computes per frame", "leaves out", "set by",
+    "loads", "falls back on", "listens to", "publishes on", "thresholds", "computes", "leaves out", "set by",
 )  # fmt: skip
 Said = Iterator[tuple[str, str]]  # the title under which a line stands, and the line
 
@@ -26,13 +25,13 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     """What `--explain` prints. It opens the models and binds nothing. Raises ModelError or SettingsError."""
     ladder = open_ladder(settings)
     parts: dict[str, list[str]] = {title: [] for title in TITLED}
-    for said in (_models, _own, _input, _output, _answers, _strictness, _left_out):
+    for said in (_models, _own, _input, _output, _answers, _strictness):
         for title, line in said(settings, ladder):
             parts[title].append(line)
     parts[SET_BY] = list(_keys(settings, sources)) or ["nothing, all defaults"]
     lines = [f"gestured {__version__}"]
     for title, items in parts.items():
-        lines += ["", f"{title}:", *(f"  {item}" for item in items)]
+        lines += ["", f"{title}:", *(f"  {item}" for item in items or ["nothing"])]
     return "\n".join(lines)
 
 
@@ -41,12 +40,12 @@ def _models(settings: Settings, ladder: Ladder) -> Said:
     what = f"{model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, sha256 {model.sha256[:12]}"
     made_for = f"{window.rows}x{window.columns} at {window.rate_hz:g} Hz"
     yield LOADS, f"model {ladder.active}: {what}, {made_for}"
-    yield LOADS, f"gestures {', '.join(gestures_in_use(ladder, settings.gestures))}"
-    yield LOADS, "numpy, onnxruntime (one thread), uvloop, pydantic, structlog"
+    used = gestures_in_use(ladder, settings.gestures)
+    yield LOADS, f"gestures {', '.join(used)}"
+    if unused := [name for name in ladder.gestures if name not in used]:
+        yield LEAVES, f"gestures {', '.join(unused)}: their scores are dropped"
     for rung in ladder.rungs[1:]:
         yield FALLBACKS, f"{rung.name}{'' if rung.model is None else ', in use'}"
-    if len(ladder.rungs) == 1:
-        yield FALLBACKS, "nothing"
 
 
 def _own(settings: Settings, ladder: Ladder) -> Said:
@@ -68,7 +67,6 @@ def _own(settings: Settings, ladder: Ladder) -> Said:
 def _input(settings: Settings, ladder: Ladder) -> Said:
     grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
     yield INPUT, f"udp {settings.listen} for {settings.addresses.pressure}"
-    yield INPUT, f"receive buffer {RECEIVE_BYTES >> 20} MiB, as far as the kernel grants it"
     allowed = ", ".join(map(str, settings.allow)) or "any source"
     yield INPUT, f"frames of {grid}, clock {settings.clock}, up to {settings.max_sensors} sensors, from {allowed}"
     armed = {"all sensors": settings.arming}
@@ -94,15 +92,12 @@ def _output(settings: Settings, ladder: Ladder) -> Said:
     yield OUTPUT, f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group"
     if settings.gates is not None:
         yield OUTPUT, f"gates: unix {settings.gates}, mode 0660, for bridges"
-    if outputs:
-        yield LOADS, "python-osc, which writes what is published"
-    else:
-        yield LEAVES, "python-osc, OSC output: no --publish"
+    if not outputs:
+        yield LEAVES, "OSC output: no --publish"
     if settings.metrics:
-        yield LOADS, "prometheus_client, and a thread that answers HTTP"
         yield INPUT, f"http {settings.metrics} for /metrics, /healthz, /readyz"
     else:
-        yield LEAVES, "prometheus_client, HTTP: no --metrics"
+        yield LEAVES, "HTTP: no --metrics"
 
 
 def _answers(settings: Settings, ladder: Ladder) -> Said:
@@ -114,7 +109,6 @@ def _answers(settings: Settings, ladder: Ladder) -> Said:
         """From the last touched frame to the answer, in words: the wait begins with the first quiet frame."""
         return f"{1 / rate_hz + wait_s:.2g} s"
 
-    yield COMPUTES, "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference"
     made = "its frames as a window" if metadata.features is None else "touch-pattern features"
     yield COMPUTES, f"after a contact: {made}, one inference"
     answered = f"at {rate_hz:g} Hz a contact is answered {felt(timing.release_s)} after its last touched frame"
@@ -165,15 +159,6 @@ def _strictness(settings: Settings, ladder: Ladder) -> Said:
     told = [f"{name} {part.threshold:g}" for name, part in settings.per_gesture.items() if part.threshold is not None]
     if told:
         yield THRESHOLDS, f"before these, thresholds of [gestures]: {', '.join(told)}"
-
-
-def _left_out(settings: Settings, ladder: Ladder) -> Said:
-    yield LEAVES, "finger positions (trajectory): nothing uses them, they are passed over"
-    yield LEAVES, "fallback models: opened when the one above fails"
-    yield LEAVES, "torch, scikit-learn: never loaded by the daemon"
-    used = gestures_in_use(ladder, settings.gestures)
-    if unused := [name for name in ladder.gestures if name not in used]:
-        yield LEAVES, f"gestures {', '.join(unused)}: their scores are dropped"
 
 
 def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
