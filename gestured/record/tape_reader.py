@@ -96,9 +96,7 @@ class _Reading:
 
 
 def _source(text: str) -> Address:
-    host, _, port = text.rpartition(":")
-    if ":" in host and not host.startswith("["):  # IPv6, as tapes before 0.1.0 have it
-        text = f"[{host}]:{port}"
+    host = text.rpartition(":")[0]
     try:
         if len(host) <= HOST_CHARACTERS:
             return Address.parse(text)
