@@ -38,10 +38,12 @@ SHARES = ("right", "wrong", "early", "confirmed", "taps")
 SETS = ("nominal", "hard", "non-gestures")
 
 
-def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
-    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
+def heard(
+    times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier, *, foresee: bool = True
+) -> list[Event]:
+    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them unless told otherwise."""
     sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
-    sensor.foresee(asked=True)
+    sensor.foresee(asked=foresee)
     found = [one for t, values in zip(times, frames, strict=True) for one in sensor.push(Frame(float(t), values))]
     return events_of([*found, *sensor.flush(float(times[-1]) + 5.0)])
 

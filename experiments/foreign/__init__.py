@@ -11,23 +11,25 @@ import numpy as np
 from experiments.foreign.hands import GESTURES, LEVELS, NON_GESTURES, draw_person, perform
 from experiments.foreign.sensors import draw_sensor, record
 
-__all__ = ["GESTURES", "GRIDS", "LEVELS", "NON_GESTURES", "other_grids", "session", "take"]
+__all__ = ["GESTURES", "KINDS", "LEVELS", "NON_GESTURES", "session", "take"]
 
 KINDS = GESTURES + NON_GESTURES
-GRIDS: tuple[tuple[int, int, float], ...] = (
-    (16, 16, 50.0),
-    (12, 20, 30.0),
-    (6, 6, 20.0),
-)  # rows, columns, Hz
 
 
 def _label(kind: str) -> str:
     return kind if kind in GESTURES else "none"
 
 
-def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: float) -> dict[str, Any]:
-    rng = np.random.default_rng([seed, KINDS.index(kind), LEVELS.index(level), rows, columns])
-    person, sensor = draw_person(rng, level), draw_sensor(rng, level, rows, columns, rate_hz)
+def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
+    """One gesture or non-gesture on a 9 x 9 sheet at about 15 Hz.
+
+    Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`, `onset` and
+    `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in each frame; a touch
+    below about 4 cannot be seen. `contacts` are the times (s) of each finger's contact. The sheet is idle for at least
+    1.3 s before and after.
+    """
+    rng = np.random.default_rng([seed, KINDS.index(kind), LEVELS.index(level), 9, 9])
+    person, sensor = draw_person(rng, level), draw_sensor(rng, level)
     performed = perform(kind, rng, person)
     onset = 1.4 + float(rng.uniform(0.0, 0.4))
     release = onset + performed.duration
@@ -42,22 +44,6 @@ def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: fl
         "seen": seen,
         "contacts": [(onset + float(p.t[0]), onset + float(p.t[-1])) for p in performed.pads],
     }
-
-
-def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
-    """One gesture or non-gesture on a 9 x 9 sheet at about 15 Hz.
-
-    Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`, `onset` and
-    `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in each frame; a touch
-    below about 4 cannot be seen. `contacts` are the times (s) of each finger's contact. The sheet is idle for at least
-    1.3 s before and after.
-    """
-    return _take(kind, seed, level, 9, 9, 15.0)
-
-
-def other_grids(kind: str, seed: int) -> list[dict[str, Any]]:
-    """A nominal `take` on each sheet of `GRIDS`, with its `rate_hz`."""
-    return [{**_take(kind, seed, "nominal", *grid), "rate_hz": grid[2]} for grid in GRIDS]
 
 
 def session(

@@ -16,9 +16,9 @@ from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 
 
-def recordings(count: int, level: str = "nominal", first: int = 0) -> Recordings:
+def recordings(count: int, level: str = "nominal") -> Recordings:
     """`count` takes of each gesture as recordings, less those that nobody can recognise."""
-    takes = [take(kind, seed, level) for kind in GESTURES for seed in range(first, first + count)]
+    takes = [take(kind, seed, level) for kind in GESTURES for seed in range(count)]
     takes = [one for one in takes if visible(one)]
     return Recordings(
         frames=np.concatenate([one["frames"] for one in takes]),
@@ -37,10 +37,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=npz, metavar="OUT", help="the .npz to write")
     parser.add_argument("--n", type=int, default=20, help="takes of each gesture (%(default)s)")
-    parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
     parser.add_argument("--level", choices=LEVELS, default="nominal")
     args = parser.parse_args()
-    made = recordings(args.n, args.level, args.first)
+    made = recordings(args.n, args.level)
     write(args.out, made)
     print(f"{args.out}: {len(made)} gestures")
 

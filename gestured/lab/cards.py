@@ -42,7 +42,7 @@ def write_blocks(
 
 def table(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """A row for each model and each set that it was judged on."""
-    return [*HEAD, *(row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, "))]
+    return [*head(), *(line for name, found in figures.items() for line in _rows(found, f"`{name}.onnx`, "))]
 
 
 def _worst(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -87,10 +87,6 @@ WORST_OF = {
 WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
 # Marked parts of a card that experiments write: of every model, and of the first one.
 OF_ALL, OF_THE_FIRST = ("judged",), ("unseen", "seeds", "judged")
-HEAD = (
-    "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
-    "|---|---|---|---|---|---|---|---|",
-)
 
 
 def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -> str:
@@ -100,7 +96,7 @@ def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -
     apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in parts]
     return templates.get_template("card.md").render(
         name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), recordings=_recordings(path),
-        table=[*HEAD, *_rows(found)], others=apart,
+        table=[*head(), *_rows(found)], others=apart,
     )  # fmt: skip
 
 
@@ -117,10 +113,17 @@ def _rows(found: Mapping[str, Any], before: str = "") -> list[str]:
     """A row for each set that a model was judged on; `before` precedes its name."""
     sets = {f"simulated, {test}": values for test, values in found["simulated"].items()}
     sets |= {f"real, {test}": values for test, values in found.get("real", {}).items() if test != "kinds"}
-    return [_row(f"{before}{title}", values) for title, values in sets.items()]
+    return [row(f"{before}{title}", values) for title, values in sets.items()]
 
 
-def _row(title: str, values: Mapping[str, Any]) -> str:
+def head(of: str = "set") -> tuple[str, str]:
+    """The head of a table whose lines are those of `row`."""
+    names = (of, "gestures", "right\\*", "right", "wrong", "lost", "non-gestures", "rejected")
+    return f"| {' | '.join(names)} |", f"|{'---|' * len(names)}"
+
+
+def row(title: str, values: Mapping[str, Any]) -> str:
+    """The line of one set, of an `Evaluation` as a dictionary."""
     ends = values["intervals"]
     shares = " | ".join(with_interval(values[n], ends[n]) for n in ("right", "wrong", "lost"))
     rejected = with_interval(values["rejected"], ends["rejected"]) if values["others"] else "-"

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 from experiments.foreign import GESTURES, NON_GESTURES, take
-from experiments.foreign.judge import Outcome, Take, judge, main, summary, visible
+from experiments.foreign import judge as foreign
+from experiments.foreign.judge import Take, evaluated, judge, visible
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
 from gestured.model.opening import open_model
@@ -33,17 +34,15 @@ BOUNDS = {  # least right, most wrong of the gestures, least rejected of the oth
 
 
 @cache
-def takes(level: str) -> list[tuple[int, Take]]:
-    kinds = (*GESTURES, *NON_GESTURES[::4])
-    made = [(seed, take(kind, seed, level)) for kind in kinds for seed in SEEDS]
-    return [(seed, one) for seed, one in made if visible(one)]
+def takes(level: str) -> list[Take]:
+    made = [take(kind, seed, level) for kind in (*GESTURES, *NON_GESTURES[::4]) for seed in SEEDS]
+    return [one for one in made if visible(one)]
 
 
 def figures(classifier: Classifier, level: str) -> tuple[float, float, float]:
     """Right and wrong of the gestures, rejected of the others."""
-    outcomes: list[Outcome] = [judge(one, seed, level, classifier) for seed, one in takes(level)]
-    found = summary(outcomes, {})[level]
-    return found["right"], found["wrong"], found["rejected"]
+    found = evaluated([judge(one, classifier) for one in takes(level)])
+    return found.right, found.wrong, found.rejected
 
 
 def passes(classifier: Classifier, name: str, level: str) -> tuple[bool, str]:
@@ -92,8 +91,10 @@ def test_the_table_of_a_document_and_of_the_cards_is_renewed(
     documents = [Path("figures.md"), *(path.with_suffix(".md") for path in shipped().values())]
     for document in documents:
         document.write_text("before\n<!-- judged: begin -->\nold\n<!-- judged: end -->\nafter\n")
-    monkeypatch.setattr(sys, "argv", "judge --n 1 --kinds one_tap palm --level nominal --document figures.md".split())
-    main()
+    monkeypatch.setattr(sys, "argv", "judge --n 1 --level nominal --document figures.md".split())
+    monkeypatch.setattr(foreign, "KINDS", ("one_tap", "palm"))
+    monkeypatch.setattr(foreign, "in_processes", lambda make, todo, *_: map(make, todo))
+    foreign.main()
     printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| `")]
     assert [line.split("`")[1] for line in printed] == [f"{name}.onnx" for name in shipped()]
     page, *cards = (document.read_text().splitlines() for document in documents)
