@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from experiments.everyday.foreign_hours import lived as foreign_lived
+from experiments.everyday import lived as foreign_lived
 from experiments.foreign import session
 from gestured.core.events import Gesture, Onset
 from gestured.core.facts import events_of

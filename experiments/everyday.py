@@ -9,13 +9,30 @@ Each half hour is of another person of experiments/foreign/life.py, from which n
 import argparse
 from functools import partial
 
-from experiments.everyday.foreign_hours import heard
+import experiments.foreign.life as foreign
 from experiments.foreign import LEVELS
-from gestured.core.points import STRICTNESS, USUAL
+from gestured.core.frames import Frame
+from gestured.core.points import STRICTNESS, USUAL, Strictness
+from gestured.core.scene import Setup
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import FIRST
 from gestured.lab.everyday.command import at, tell
+from gestured.lab.everyday.hours import Heard, hear
 from gestured.lab.everyday.report import figures, tables
+from gestured.lab.everyday.stretches import Stretch
+
+
+def lived(level: str, seed: int) -> Stretch:
+    """Half an hour of the other generator."""
+    life = foreign.live(seed, level)
+    frames = map(Frame, life.times.tolist(), life.frames)
+    setup = Setup(grid=life.frames.shape[1:])
+    return Stretch(life.place, str(seed), frames, setup, life.meant, life.taps, len(life.contacts))
+
+
+def heard(level: str, model: str, strictness: Strictness, seed: int) -> Heard:
+    """A model's answers in half an hour of the other generator."""
+    return hear(lived(level, seed), at(model, strictness), strictness)
 
 
 def main() -> None:
