@@ -8,13 +8,15 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed, parallel_config
-from joblib.externals.loky.process_executor import TerminatedWorkerError
+import torch
+from threadpoolctl import threadpool_limits
 
 from gestured.core.errors import GesturedError
+from gestured.lab.dataset import in_processes
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.study.material import Data
@@ -56,39 +58,33 @@ class Schedule:
         done = {task: _read(path) for task, path in paths.items() if path.exists()}
         found = {task: result for task, result in done.items() if result is not None}
         todo = [task for task in paths if task not in found]
-        for task, result in progress(self._computed(todo, sets), len(todo), title):
+        for task, result in self._computed(todo, sets, title):
             keep(paths[task], result)
             found[task] = result
         return found
 
-    def _computed(self, todo: Sequence[Task], sets: Mapping[str, Data]) -> Iterator[tuple[Task, Result]]:
-        if todo:
-            yield from _here(todo, sets, self.jobs) if self.cluster is None else _there(todo, sets, self.cluster)
+    def _computed(self, todo: Sequence[Task], sets: Mapping[str, Data], title: str) -> Iterator[tuple[Task, Result]]:
+        if not todo:
+            return
+        if self.cluster is None:
+            yield from in_processes(partial(_nth, todo, sets), range(len(todo)), self.jobs, title)
+        else:
+            yield from progress(_there(todo, sets, self.cluster), len(todo), title)
 
 
 def compute(task: Task, data: Data) -> tuple[Task, Result]:
-    """A task and its result."""
-    return task, run(task, data)
+    """A task and its result, by one thread: other processes compute beside this one."""
+    torch.set_num_threads(1)
+    with threadpool_limits(1):
+        return task, run(task, data)
 
 
-def _here(todo: Sequence[Task], sets: Mapping[str, Data], jobs: int) -> Iterator[tuple[Task, Result]]:
-    """Compute in joblib's own processes. Raises GesturedError if one is killed."""
-    calls = (delayed(compute)(task, sets[task.data]) for task in todo)
-    try:
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2 * n_jobs", batch_size=1)(
-                calls
-            )
-    except TerminatedWorkerError:
-        reason = "as where there is too little memory"
-        raise GesturedError(f"a process that --jobs started was killed, {reason}") from None
+def _nth(todo: Sequence[Task], sets: Mapping[str, Data], n: int) -> tuple[Task, Result]:
+    return compute(todo[n], sets[todo[n].data])
 
 
 def _there(todo: Sequence[Task], sets: Mapping[str, Data], cluster: str) -> Iterator[tuple[Task, Result]]:
-    """Compute on Dask's workers behind a scheduler's address. Raises GesturedError if it cannot.
-
-    Joblib's backend for Dask is not used, since it waits for ever for the result of a worker that was killed.
-    """
+    """Compute on Dask's workers behind a scheduler's address. Raises GesturedError if it cannot."""
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
     except ModuleNotFoundError:

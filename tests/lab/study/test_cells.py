@@ -5,11 +5,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
-from joblib import Parallel
 
 from gestured.core.errors import GesturedError
 from gestured.lab.study import cells, study
@@ -25,8 +22,7 @@ TASKS = [task(CLEAN), task(PARTICIPANTS), task(PARTICIPANTS, "none")]
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computes in this process: starting others takes longer than the work."""
-    real = Parallel
-    monkeypatch.setattr(cells, "Parallel", lambda n_jobs, **more: real(n_jobs=1, **more))
+    monkeypatch.setattr(cells, "in_processes", lambda make, todo, *_: map(make, todo))
 
 
 def test_a_second_run_computes_nothing(tmp_path: Path, here: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,25 +106,13 @@ def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
     assert together == alone
 
 
-def killed(folder: Path, monkeypatch: pytest.MonkeyPatch, address: str | None) -> str:
-    """What is said where whatever computes is killed."""
-    # By value, so that the processes need not import this file and what it stands on.
-    monkeypatch.setattr(cells, "compute", lambda *_: __import__("os").kill(__import__("os").getpid(), 9))
-    task: Any = SimpleNamespace(data="simulated")
-    data: Any = None
-    with pytest.raises(GesturedError) as raised:
-        list(Schedule(folder, 2, address)._computed([task, task], {"simulated": data}))
-    return str(raised.value)
-
-
-def test_a_process_that_is_killed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "a process that --jobs started was killed" in killed(tmp_path, monkeypatch, None)
-
-
 def test_workers_of_a_cluster_that_are_killed_are_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cluster: str
 ) -> None:
-    assert f"--cluster: workers or the scheduler at {cluster} were killed" in killed(tmp_path, monkeypatch, cluster)
+    # By value, so that the workers need not import this file and what it stands on.
+    monkeypatch.setattr(cells, "compute", lambda *_: __import__("os").kill(__import__("os").getpid(), 9))
+    with pytest.raises(GesturedError, match=f"--cluster: workers or the scheduler at {cluster} were killed"):
+        Schedule(tmp_path, 2, cluster).results(TASKS, {"simulated": data()}, "cells")
 
 
 def test_without_a_scheduler_one_sentence_says_so(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from experiments.foreign.recordings import recordings
 from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.made_of import LINE
-from gestured.lab.study import cohort
+from gestured.lab.study import cells, cohort
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
@@ -42,7 +42,8 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
     small = Plan.small
     monkeypatch.setattr(Plan, "small", lambda seed: replace(small(seed), steps=4, timed=2))
-    monkeypatch.setattr(cohort, "in_processes", lambda make, todo, *_: map(make, todo))
+    for module in (cells, cohort):
+        monkeypatch.setattr(module, "in_processes", lambda make, todo, *_: map(make, todo))
     write(tmp_path / "foreign.npz", recordings(1))
     where = ["--cache", str(tmp_path / "cache"), "--jobs", "1"]
     where += ["--foreign", str(tmp_path / "foreign.npz")]
