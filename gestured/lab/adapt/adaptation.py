@@ -109,56 +109,38 @@ LOSS = 0.01  # the most of the simulated gestures that may be lost, and of simul
 
 
 @dataclass(frozen=True)
-class Settled:
-    """Adapted networks, their decision and threshold, and their shares on own recordings."""
+class Adapted:
+    """Adapted networks, their decision and threshold, and the shares of both models."""
 
     judged: Judged
     least: float  # the confidence from which an answer is published
-    before: Shares
+    before: Shares  # of the old model on own recordings
     after: Shares
+    simulated_before: Shares  # of the old model on simulated nominal recordings
+    simulated_after: Shares
     way: float  # share of the way from the old weights to the new ones, one of `WAYS`
     groups: Groups
     answers: Answers  # the new model's answers to people who were held out
-    apart: Sequence[tuple[Judged, Samples]]  # for each group of people: networks without it, and its samples
-
-
-@dataclass(frozen=True)
-class Adapted:
-    """The new model, and the shares of both models on simulated nominal recordings."""
-
-    new: Settled
     provisional: Mapping[str, Any]  # the rule for provisional events
-    before: Shares
-    after: Shares
     points: None = None  # the metadata `operating_points`: a model that was adapted to recordings alone has none
-
-    @property
-    def judged(self) -> Judged:
-        """The networks, their decision and their verifier."""
-        return self.new.judged
-
-    @property
-    def least(self) -> float:
-        """The confidence from which an answer is published."""
-        return self.new.least
 
     def answered(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """(N,) the confidence of each answer to people who were held out, and whether they performed a gesture."""
-        cut = self.new.answers.confidence >= 0
-        return self.new.answers.confidence[cut], self.new.answers.known[cut]
+        cut = self.answers.confidence >= 0
+        return self.answers.confidence[cut], self.answers.known[cut]
 
     def reasons(self) -> list[str]:
         """Why the new model is no better than the old one; empty if it is."""
         found = []
-        old, new = self.new.before, self.new.after
+        old, new = self.before, self.after
         if not new.right[0] > old.right[0]:
             found.append(f"right does not go up ({old.right[0]:.3f} -> {new.right[0]:.3f})")
         if new.wrong[0] > old.wrong[0]:
             found.append(f"wrong goes up ({old.wrong[0]:.3f} -> {new.wrong[0]:.3f})")
-        lost = self.before.right[0] - self.after.right[0]
+        lost = self.simulated_before.right[0] - self.simulated_after.right[0]
         if lost > LOSS:
             found.append(f"{100 * lost:.1f} points of the simulated gestures are lost, expected 1 at most")
-        taken = self.after.accepted[0] - self.before.accepted[0]
+        taken = self.simulated_after.accepted[0] - self.simulated_before.accepted[0]
         if taken > LOSS:
             remedy = "" if new.others else "; record non-gestures of your own, too (gestured-lab collect)"
             found.append(
@@ -168,15 +150,8 @@ class Adapted:
 
 
 def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
-    """Adapt a model to own recordings, and judge both models."""
+    """Train a model further with own recordings, and judge it before and after."""
     start, least = base.judged, points_of(base.model)[USUAL]
-    new = settled(start, least, own, takes, course)
-    before, after = _nominal(start, least, takes), _nominal(new.judged, new.least, takes)
-    return Adapted(new, _early(new, takes), before, after)
-
-
-def settled(start: Judged, least: Least, own: Own, takes: Simulated, course: Course) -> Settled:
-    """Train networks that publish from `least` on further, with own recordings."""
     groups = held_out(own)
     ends = [
         learned(start, takes.teach, own.samples.take(groups.of_samples != k), course, f"without {k + 1}/{groups.count}")
@@ -202,8 +177,13 @@ def settled(start: Judged, least: Least, own: Own, takes: Simulated, course: Cou
     judged = between(start, end, way)
     judged.decision = decision
     chosen = _least(judged_by(run.said[way].answers(decision, start.verifier)), before)
+    # The rule for provisional events comes from answers to samples that the networks have not learned from.
     apart = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
-    return Settled(judged, chosen, before, new.shares(_least(new, before)), way, groups, new, apart)
+    parts = [(judged, takes.check), (judged, takes.early), *apart]
+    asked = [(nn.ModuleDict({"net": one.net, "trajectory": one.trajectory}), some) for one, some in parts]
+    rule = Foretold.sessions(asked).rule("net", judged, chosen)
+    shares = before, new.shares(_least(new, before)), _nominal(start, least, takes), _nominal(judged, chosen, takes)
+    return Adapted(judged, chosen, *shares, way, groups, new, rule)
 
 
 class _Run:
@@ -245,13 +225,6 @@ def _losses(start: Judged, said: Evidence, classes: NDArray[np.int64]) -> NDArra
     known = classes < len(GESTURES)
     named = scores[np.arange(len(classes)), np.minimum(classes, len(GESTURES) - 1)] * (1 - unknown)
     return -np.log(np.maximum(np.where(known, named, unknown), 1e-6)).astype(np.float64)
-
-
-def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
-    """The rule for provisional events, from answers to samples that the networks have not learned from."""
-    parts = [(new.judged, takes.check), (new.judged, takes.early), *new.apart]
-    asked = [(nn.ModuleDict({"net": one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
-    return Foretold.sessions(asked).rule("net", new.judged, new.least)
 
 
 def _nominal(judged: Judged, least: Least, takes: Simulated) -> Shares:

@@ -136,26 +136,26 @@ def _facts(
 
 
 def _figures(own: Own, found: Adapted) -> dict[str, Any]:
-    new, groups = found.new, found.new.groups
+    groups = found.groups
     return {
         "people": len(own.names),
         "held_out": {"unit": groups.unit, "groups": groups.count, "worth": WORTH[groups.unit]},
         "left_out": own.left_out,
-        "before": {"own": new.before.as_dict(), "simulated": found.before.as_dict()},
-        "after": {"own": new.after.as_dict(), "simulated": found.after.as_dict()},
-        "threshold": round(new.least, 4),
-        "way": new.way,
+        "before": {"own": found.before.as_dict(), "simulated": found.simulated_before.as_dict()},
+        "after": {"own": found.after.as_dict(), "simulated": found.simulated_after.as_dict()},
+        "threshold": round(found.least, 4),
+        "way": found.way,
     }
 
 
 def _tell(own: Own, found: Adapted) -> None:
-    new, shares = found.new, found.new.before
+    shares = found.before
     say(f"{len(own.names)} people, {shares.gestures} gestures, {shares.others} non-gestures")
     _tell_left_out(own)
     say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
-    for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
-        say(_row(f"{title} before", before), _row(f"{title} after", after))
-    say(f"threshold {new.least:.3f}, at which no more are wrong than before at normal", WORTH[new.groups.unit])
+    say(_row("own before", found.before), _row("own after", found.after))
+    say(_row("simulated before", found.simulated_before), _row("simulated after", found.simulated_after))
+    say(f"threshold {found.least:.3f}, at which no more are wrong than before at normal", WORTH[found.groups.unit])
     say(
         "the model has no operating points: every strictness publishes from this threshold on, and how many gestures",
         "are false in everyday contact is not known yet",

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from gestured.lab.adapt.adaptation import Adapted, Settled, Shares
+from gestured.lab.adapt.adaptation import Adapted, Shares
 
 NOTHING: Any = None  # what no reason looks at
 
@@ -17,8 +17,8 @@ def shares(right: float, wrong: float = 0.02, accepted: float = 0.04, others: in
 
 def reasons(own: Shares, simulated: Shares) -> list[str]:
     """Of a model that was 0.80 right here, and 0.95 right on simulated takes."""
-    new = Settled(NOTHING, 0.5, shares(0.80), own, 1.0, NOTHING, NOTHING, [])
-    return Adapted(new, {}, shares(0.95), simulated).reasons()
+    both = shares(0.80), own, shares(0.95), simulated
+    return Adapted(NOTHING, 0.5, *both, 1.0, NOTHING, NOTHING, {}).reasons()
 
 
 def test_what_is_better_here_and_no_worse_there_is_written() -> None:
