@@ -6,7 +6,7 @@ the subjects they are judged on (three folds).
 
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -51,25 +51,21 @@ class Evaluation:
     wrong: float
     lost: float  # to unknown, or never cut out
     rejected: float  # of the non-gestures
-    people: int = 0  # number of people who performed; 0 if it is not known
-    intervals: dict[str, dict[str, float]] = field(default_factory=dict)  # low and high, 95 % over people, by name
+    people: int  # number of people who performed
+    intervals: dict[str, dict[str, float]]  # low and high, 95 % over people, by name
 
 
 def outcome(
-    answers: Answers,
-    labels: NDArray[np.int64],
-    least: float,
-    performed: int | None = None,
-    people: NDArray[np.int64] | None = None,
+    answers: Answers, labels: NDArray[np.int64], least: float, performed: int, people: NDArray[np.int64]
 ) -> Evaluation:
-    """Judge answers against classes (N,), published from a confidence of `least` on.
+    """Judge answers against classes (N,) of `people` (N,), published from a confidence of `least` on.
 
-    `performed`: how many gestures were performed, if some were never cut out. With `people` (N,) there are intervals;
-    since it is not known whose gestures were never cut out, their share is taken as fixed.
+    `performed`: how many gestures were performed, whether or not they were cut out. It is not known whose gestures were
+    never cut out, so their share is taken as fixed in the intervals.
     """
     scores, _ = answers
     known = (labels >= 0) & (labels < scores.shape[1])
-    total = max(performed or 0, int(known.sum()))
+    total = max(performed, int(known.sum()))
     published = confidence(answers) >= least
     right = scores.argmax(axis=1) == labels
 
@@ -77,14 +73,11 @@ def outcome(
         return float(chosen.sum() / of) if of else float("nan")
 
     hits, misses = share(right & published & known, total), share(~right & published & known, total)
-    found = Evaluation(
-        total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
-        share(~published & ~known, int((~known).sum())),
-    )  # fmt: skip
-    if people is None:
-        return found
     ends = _intervals(known, published, right, known.sum() / max(total, 1), people)
-    return replace(found, people=len(np.unique(people)), intervals=ends)
+    return Evaluation(
+        total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
+        share(~published & ~known, int((~known).sum())), len(np.unique(people)), ends,
+    )  # fmt: skip
 
 
 def _intervals(
@@ -200,7 +193,7 @@ def real_figures(plan: TrainingPlan, data: TrainingData, cache: Path) -> dict[st
         for title in REAL_SETS:
             chosen = is_of(real.labels, title) & judged_once
             answers = scores[chosen], unknown[chosen]
-            result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
+            result = outcome(answers, labels[chosen], least, data.performed[title], real.people[chosen])
             found.setdefault(name, {})[title] = asdict(result) | {"worst": worst(answers, real.take(chosen), least)}
         found[name]["kinds"] = by_kind((scores, unknown), real, least)
         if name == RECURRENT[0]:
@@ -215,4 +208,4 @@ def _by_simulation(trained: Trained, name: str, data: TrainingData, real: Sample
     alone = Trained(trained.start, None)
     module, calibration, _ = judged(alone, name, calibration_set(alone, data), data)
     given = alone.evidence(name, real).answers(module.decision, module.verifier)
-    return asdict(outcome(given, targets(real), calibration["threshold"], data.performed.get(MIXED), real.people))
+    return asdict(outcome(given, targets(real), calibration["threshold"], data.performed[MIXED], real.people))

@@ -98,9 +98,9 @@ class TrainingData:
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
     real: Samples | None
-    real_judged: int = 0  # number of those that judge, the first ones: cut gestures, whose touches sessions hold again
-    lived: Samples | None = None  # everyday life of people from whom no network learned; None: no verifier
-    spoken: Samples | None = None  # everyday life of further people on the nominal sensor, for operating points
+    real_judged: int  # number of those that judge, the first ones: cut gestures, whose touches sessions hold again
+    lived: Samples  # everyday life of people from whom no network learned, for the verifier
+    spoken: Samples  # everyday life of further people on the nominal sensor, for operating points
 
 
 def load_data(
@@ -251,10 +251,10 @@ def calibration_set(trained: Trained, data: TrainingData) -> Calibrated:
 def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, jobs: int) -> Foretold:
     """The `Foretold` of calibration people, further ones and real subjects, by networks that have not seen them."""
     further = simulated(cache, "wide", 4, plan.wide_early, jobs)
-    alone = [data.calibrate, further]
-    if data.lived is not None:
-        alone = [replace(one, context=with_past_of(one, data.lived, n)) for n, one in enumerate(alone)]
-    parts = [(trained.nets, one) for one in alone]
+    parts = [
+        (trained.nets, replace(one, context=with_past_of(one, data.lived, n)))
+        for n, one in enumerate((data.calibrate, further))
+    ]
     if data.real is not None:
         parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
     return Foretold.sessions(parts)
@@ -265,12 +265,12 @@ def judged(
 ) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
     """A network with its second opinion, their calibration, and figures of its answers (`answer_figures`).
 
-    If `data` holds everyday life, there is a verifier, too, and the threshold is fitted on its answers.
+    With `data` there is a verifier, too, and the threshold is fitted on its answers.
     """
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
     answers, labels, sets, verifier = decided(decision, first, second), calibrated.labels, calibrated.sets, None
-    if data is not None and data.lived is not None:
+    if data is not None:
         alone = data.calibrate.take(targets(data.calibrate) >= 0)
         taken = trained.evidence(name, alone).beside(with_past_of(alone, data.lived, 1))
         learned = [(trained.evidence(name, data.lived), taught(data.lived)), (taken, taught(alone))]
@@ -288,8 +288,6 @@ def measured_points(
     trained: Trained, module: Judged, name: str, data: TrainingData, plan: TrainingPlan
 ) -> dict[str, Any]:
     """The metadata `operating_points` of a network with a verifier, on hours of people from whom it has not learned."""
-    assert data.spoken is not None
-    assert module.verifier is not None
     answers = trained.evidence(name, data.spoken).answers(module.decision, module.verifier)
     performed = sum(meant_on(3, index) for index in range(plan.days_points))
     return operating_points(answers, data.spoken, performed, plan.days_points * DAY_S / 3600.0)

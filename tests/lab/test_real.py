@@ -58,7 +58,7 @@ def test_what_was_never_cut_is_lost_and_what_is_in_both_files_counts_once(folder
     assert performed == {"taps and swipes": 4, "with non-gestures": 4}
     once = samples.take(np.arange(judged))
     surely = np.eye(10, dtype=np.float32)[targets(once)], np.zeros(judged, np.float32)
-    result = outcome(surely, targets(once), 0.5, performed["taps and swipes"])
+    result = outcome(surely, targets(once), 0.5, performed["taps and swipes"], once.people)
     assert (result.gestures, result.right, result.wrong, result.lost) == (4, 0.75, 0.0, 0.25)
 
 
