@@ -50,15 +50,15 @@ class Choice:
 def variants(cohort: Cohort) -> dict[str, Data]:
     """The cohort through other windows: running averages, and other ways to scale pressure."""
     out = {
-        f"average-{n}": Data.of(f"average-{n}", cohort.windows(replace(WINDOW, smooth_frames=n)))
+        f"average-{n}": Data.of(cohort.windows(replace(WINDOW, smooth_frames=n)))
         for n in AVERAGES if n != WINDOW.smooth_frames
     }  # fmt: skip
     samples = cohort.samples
     peaks = samples.strength * cohort.noise  # counts
     by_count = np.repeat(peaks / np.median(peaks), samples.lengths())[:, None, None]
     own_peak = np.maximum(samples.frames.astype(np.float32).max(axis=(1, 2), keepdims=True), 0.05)
-    out["counts"] = Data.of("counts", _scaled(samples, by_count))
-    out["each frame"] = Data.of("each frame", _scaled(samples, 1 / own_peak))
+    out["counts"] = Data.of(_scaled(samples, by_count))
+    out["each frame"] = Data.of(_scaled(samples, 1 / own_peak))
     return out
 
 

@@ -22,14 +22,13 @@ class Data:
     """A set of gestures. Two are equal if their keys are, so that a process prepares each once."""
 
     key: str  # a digest of all samples
-    name: str = field(compare=False)  # simulated, real or foreign
     gestures: Samples = field(compare=False)
     judges: Samples | None = field(compare=False, default=None)  # of another generator: they judge and teach nothing
 
     @classmethod
-    def of(cls, name: str, gestures: Samples, judges: Samples | None = None) -> "Data":
+    def of(cls, gestures: Samples, judges: Samples | None = None) -> "Data":
         """A set with the key of its samples."""
-        return cls(gestures.digest()[:16] + (judges.digest()[:8] if judges else ""), name, gestures, judges)
+        return cls(gestures.digest()[:16] + (judges.digest()[:8] if judges else ""), gestures, judges)
 
 
 @dataclass(frozen=True)
@@ -111,17 +110,8 @@ def shifted(window: NDArray[np.floating], rows: int, columns: int) -> NDArray[np
     return out
 
 
-@dataclass(frozen=True, slots=True)
-class Copies:
-    """What Algorithm 1 makes of G samples: 4 G more, edge by edge."""
-
-    samples: Samples
-    source: NDArray[np.int64]  # (4 G,) the sample that each was made of
-    same: NDArray[np.bool_]  # (4 G,) whether the shift was zero: the gesture itself
-
-
-def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
-    """The paper's augmentation, Algorithm 1: each gesture again at the edges of the sensor.
+def copies(samples: Samples, threshold: float = THRESHOLD) -> tuple[Samples, NDArray[np.int64], NDArray[np.bool_]]:
+    """The paper's augmentation, Algorithm 1: each of G gestures again at the edges of the sensor.
 
     The bounding box of a gesture holds every taxel that was pressed in any of its frames. The whole gesture is moved up
     until its box touches the top edge, and again for the bottom, the left and the right edge: four copies of each. If
@@ -130,6 +120,8 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
 
     The paper leaves open from which pressure on a taxel belongs to the box. Ours is `THRESHOLD` of the gesture's peak.
     With a threshold of zero, noise fills the frame and every copy is the gesture itself.
+
+    Returns 4 G samples, edge by edge; (4 G,) the gesture that each was made of; (4 G,) whether the shift was zero.
     """
     count, edges = len(samples), len(EDGES)
     frames = np.zeros((edges, *samples.frames.shape), samples.frames.dtype)
@@ -146,7 +138,7 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
         np.append(starts, edges * samples.offsets[-1]).astype(np.int64),
         *(np.concatenate([getattr(samples, name)] * edges) for name in OF_EACH),
     )
-    return Copies(made, np.tile(np.arange(count), edges), same.ravel())
+    return made, np.tile(np.arange(count), edges), same.ravel()
 
 
 @lru_cache(maxsize=4)
@@ -159,8 +151,8 @@ def pool(data: Data, augmentation: str, form: Form = NO_FORM, box: float = THRES
     gestures = averaged(data.gestures, form.average) if form.average > 1 else data.gestures
     parts, source, same = [gestures], np.arange(count), np.ones(count, bool)
     if augmentation == SHIFT:
-        made = copies(gestures, box)
-        parts, source, same = [*parts, made.samples], np.append(source, made.source), np.append(same, made.same)
+        made, made_of, unmoved = copies(gestures, box)
+        parts, source, same = [*parts, made], np.append(source, made_of), np.append(same, unmoved)
     if data.judges is not None:
         parts.append(data.judges)
         source = np.append(source, np.full(len(data.judges), JUDGE))

@@ -20,7 +20,7 @@ from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.study import cohort, tables
 from gestured.lab.study.cells import Schedule
-from gestured.lab.study.choices import TUNING, choices, tune
+from gestured.lab.study.choices import choices, tune
 from gestured.lab.study.material import Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.picture import write_picture
@@ -69,11 +69,11 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
     real = cohort.real(folder, plan.real)  # first, so that a wrong file is reported before half an hour of work
     foreign = cohort.judges(others) if others else None
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
-    sets = {"simulated": Data.of("simulated", people.samples)}
+    sets = {"simulated": Data.of(people.samples)}
     if real:
-        sets["real"] = Data.of("real", real[0])
+        sets["real"] = Data.of(real[0])
     if foreign:
-        sets["foreign"] = Data.of("foreign", people.samples, foreign[0])
+        sets["foreign"] = Data.of(people.samples, foreign[0])
     tuned = tune(plan, _others(plan, schedule), schedule)
     cells = tables.wanted(plan, sets)
     tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
@@ -129,7 +129,7 @@ def _others(plan: Plan, schedule: Schedule) -> Data | None:
     if not plan.tuning_people:
         return None
     trials = plan.trials_of(plan.tuning_people)
-    return Data.of(TUNING, cohort.load_cohort(schedule.cache, trials, schedule.jobs, cohort.TUNING_SEED).samples)
+    return Data.of(cohort.load_cohort(schedule.cache, trials, schedule.jobs, cohort.TUNING_SEED).samples)
 
 
 def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The main tables: how much is computed, which cells there are, and the figures of each."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gestured.lab.dataset import TRIALS
 from gestured.lab.intervals import summary
-from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, Data
+from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.protocols import CLEAN, FOREIGN, PADDED, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
 from gestured.lab.study.views import Values
@@ -68,17 +68,17 @@ class Cell:
     data: str
 
 
-def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
-    """The cells of all tables; methods beyond the paper have tuned hyperparameters alone."""
+def wanted(plan: Plan, sets: Iterable[str]) -> list[Cell]:
+    """The cells of all tables of these sets of data; methods beyond the paper have tuned hyperparameters alone."""
     cells = []
     for method in METHODS.values():
         for settings in (GIVEN, TUNED) if method.paper else (TUNED,):
-            for data in sets.values():
-                for protocol in ASKED.get(data.name, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
+            for data in sets:
+                for protocol in ASKED.get(data, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
                     for augmentation in AUGMENTATIONS:
                         if _skipped(plan, settings, protocol, augmentation):
                             continue
-                        cells.append(Cell(method.id, settings, augmentation, protocol, data.name))
+                        cells.append(Cell(method.id, settings, augmentation, protocol, data))
     return cells
 
 

@@ -27,4 +27,4 @@ def samples(people: int = 6) -> Samples:
 
 def data(people: int = 6) -> Data:
     """The same as the study takes it."""
-    return Data.of("simulated", samples(people))
+    return Data.of(samples(people))

@@ -69,7 +69,7 @@ def test_under_the_papers_protocol_alone_frames_are_a_running_average() -> None:
 
 
 def test_those_of_another_generator_judge_and_teach_nothing() -> None:
-    of = Data.of("foreign", samples(3), samples(1))
+    of = Data.of(samples(3), samples(1))
     asked = task(FOREIGN, UNCHANGED)
     found, _ = material(asked, of)
     ((train, test),) = splits(asked, found)
