@@ -23,10 +23,10 @@ from experiments.foreign.sensors import draw_sensor
 from experiments.foreign.sensors import record as record_foreign
 from experiments.pages import add_document, tell
 from gestured.core.events import Where
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.frames import Segment
 from gestured.core.spots import spots
 from gestured.core.where import where
+from gestured.lab.dataset import cuts
 from gestured.lab.progress import progress
 from gestured.lab.table import Table, Value
 from gestured.lab.train import REAL_FILES
@@ -112,25 +112,13 @@ def foreign(kind: str, good: bool, grid: Grid, seed: int) -> Take:
     return Take(frames, times, 0.0, fingers)
 
 
-def segments(take: Take) -> list[Segment]:
-    """The segments that the front end cuts out of a take."""
-    front_end = FrontEnd(*take.frames.shape[1:])
-    found = [
-        one
-        for t, values in zip(take.times, take.frames, strict=True)
-        for one in front_end.push(Frame(float(t), values))
-    ]
-    found += front_end.flush(float(take.times[-1]) + 0.3)
-    return [one.segment for one in found if isinstance(one, Cut)]
-
-
 def taken(
     make: Callable[..., Take], kinds: tuple[str, ...], good: bool, grid: Grid, count: int
 ) -> Iterator[tuple[Take, Segment]]:
     """Those of `count` takes that have exactly one segment, each with its segment."""
     for k in range(count):
         take = make(kinds[k % len(kinds)], good, grid, FIRST + k)
-        cut = segments(take)
+        cut = cuts(take.frames, take.times)
         if len(cut) == 1:
             yield take, cut[0]
 
