@@ -29,7 +29,6 @@ from experiments.foreign.sensors import draw_sensor, record
 from gestured.record.judge import NONE, Performed
 
 PLACES = ("armrest", "door", "seat", "robot", "table")
-HOW = ("quiet", "middle", "after", "beside")  # the circumstances of a meant gesture, see `Life`
 LENGTH_S = 1800.0
 RATES: dict[str, tuple[tuple[float, ...], float, str]] = {  # an hour at each of PLACES; mean size of a bout; source
     "gesture": ((90, 90, 90, 90, 90), 1.0, "issue 22: about 90"),

@@ -193,8 +193,7 @@ class Quieter:
 def quieter(base: Base, own: Own, lived: Lived, takes: Simulated) -> Quieter:
     """Let the verifier of a model learn from own hours, and judge it before and after."""
     old = base.judged.verifier
-    if old is None:
-        raise GesturedError(f"{base.model.name}: expected a model with a verifier, as all that are shipped have")
+    assert old is not None
     heard = _Heard(own, lived)
     evidence = Evidence.join(
         [opinions(base.judged, own.samples).beside(with_past_of(own.samples, lived.samples, 1)),

@@ -65,26 +65,24 @@ def base_of(source: str) -> Base:
     return Base(model, judged)
 
 
-def untrained(kind: str, *, verified: bool = False) -> Judged:
-    """The networks of a kind, and their decision, before anything was learned; perhaps with a verifier."""
+def untrained(kind: str) -> Judged:
+    """The networks of a kind, their decision and their verifier, before anything was learned."""
     nets = build()
     net, trajectory = nets[kind], nets["trajectory"]
     assert isinstance(net, Opinion)
     assert isinstance(trajectory, Opinion)
-    verifier = Verifier(Decision.CUES, UNITS + HIDDEN, len(NAMES)) if verified else None
+    verifier = Verifier(Decision.CUES, UNITS + HIDDEN, len(NAMES))
     return Judged(net, trajectory, Decision(len(GESTURES)), verifier).eval()
 
 
 def read(proto: onnx.ModelProto, kind: str, calibration: Mapping[str, Any]) -> Judged:
-    """The networks of an ONNX graph, their decision and their verifier, if it has one.
+    """The networks of an ONNX graph, their decision and their verifier.
 
     Raises ValueError if the graph and the calibration do not hold every weight.
     """
     stored = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
-    judged = untrained(kind, verified="verifier.mean" in stored)
-    found = _recurrent(judged, proto, stored) | _shares(calibration.get("temperature"))
-    if judged.verifier is not None:  # a verifier replaces the decision's rejection, whose weights the graph then lacks
-        found |= _rejection(calibration)
+    judged = untrained(kind)
+    found = _recurrent(judged, proto, stored) | _shares(calibration.get("temperature")) | _rejection(calibration)
     state = {}
     for name, expected in judged.state_dict().items():
         value = found.get(name, stored.get(name))
@@ -130,7 +128,7 @@ def _shares(temperatures: object) -> dict[str, NDArray[np.generic]]:
 
 
 def _rejection(calibration: Mapping[str, Any]) -> dict[str, NDArray[np.generic]]:
-    """The weights by which a decision without a verifier rejects."""
+    """The weights by which the decision alone would reject; the graph lacks them, since its verifier does that."""
     weight, bias = calibration.get("unknown_weight"), calibration.get("unknown_bias")
     if not isinstance(weight, list) or not all(isinstance(value, int | float) for value in (*weight, bias)):
         raise ValueError("calibration: unknown_weight and unknown_bias: expected numbers")

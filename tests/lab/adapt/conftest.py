@@ -16,6 +16,7 @@ from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
 from gestured.lab.own import learn as own
 from gestured.lab.samples import WINDOW, Samples, collect
+from gestured.model.context import NAMES
 from gestured.simulator import GESTURES, wide
 from tests.lab.test_own import drawn
 
@@ -39,7 +40,8 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
     calibration = {"temperature": [2.0, 2.0], "unknown_weight": [0.0] * 6, "unknown_bias": 0.0, "threshold": 0.5}
     origin = {"file": "old.npz", "sha256": "0" * 64, "subjects": ["1"], "consents": {}}
     facts = Facts(
-        "cnn_lstm", "7", GESTURES, WINDOW, calibration, "0" * 64, {}, classes=CLASSES, learned_from=[origin]
+        "cnn_lstm", "7", GESTURES, WINDOW, calibration, "0" * 64, {}, classes=CLASSES, context=NAMES,
+        learned_from=[origin],
     )  # fmt: skip
     export_net(untrained("cnn_lstm"), path, facts)
     return path
