@@ -256,8 +256,10 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     monkeypatch.setattr(dataset, "in_processes", lambda make, todo, *_: map(make, todo))
     monkeypatch.setattr(learn, "played", lambda *_: drawn())
     monkeypatch.setattr(learn, "FOLDS", 2)
+    monkeypatch.setattr(train, "FOLDS", 2)
+    monkeypatch.setattr("gestured.lab.export.CHECKED_LENGTHS", (1, 15))
     spread = {"wide": range(20), "cohort": range(0, len(TRIALS), 122), "others": range(0, len(OTHER_TRIALS), 122)}
-    spread |= {"days": range(2), "days_by_chance": range(1), "nominal_days": range(2)}
+    spread |= {"days": range(1), "days_by_chance": range(1), "nominal_days": range(2)}
     made: dict[tuple[str, int], Samples] = {}
 
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
@@ -272,7 +274,7 @@ def test_train_makes_three_models_and_evaluate_their_figures(
         return replace(taken, people=subjects), len(taken) - 10
 
     fit = FitConfig(epochs=1, real_epochs=1, real_samples=64)
-    plan = train.TrainingPlan(20, 20, 20, others=80, days=2, days_points=2, forest=200, fit=fit)
+    plan = train.TrainingPlan(20, 20, 20, others=80, days=1, days_points=2, forest=200, fit=fit)
     monkeypatch.setattr(train, "simulated", simulated)
     monkeypatch.setattr(train, "_real", real)
     monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))

@@ -13,7 +13,7 @@ import onnx
 import pytest
 
 from gestured.control.cli import main as gesturectl
-from gestured.lab.adapt import command
+from gestured.lab.adapt import adaptation, command
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.cli import main
@@ -74,6 +74,7 @@ def test_the_document_leads_to_a_model(
 ) -> None:
     """What docs/own-sensor.md does with recordings runs, in its order; the model still learns gestures of one's own."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(adaptation, "WAYS", (1.0,))
     Path("recordings").mkdir()
     for k, name in enumerate(("07", "08")):
         made = cut_gestures((name,), GESTURES, repeats=2, sensor=unknown_sensor(k))
@@ -114,11 +115,18 @@ def test_a_sensor_that_models_do_not_know_is_learned(run: Run, tmp_path: Path) -
     assert after["wrong"]["share"] <= before["wrong"]["share"]
 
 
-@pytest.mark.timeout(300)
-def test_the_old_model_is_judged_at_its_usual_operating_point(run: Run, tmp_path: Path) -> None:
-    """As whoever runs it does; its one threshold is used by no strictness."""
+def test_the_old_model_is_judged_at_its_usual_operating_point(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As whoever runs it does; its one threshold is used by no strictness. The new one has learned nothing here."""
     path = sluggish(tmp_path)
-    _, out, _ = run(path, "--out", "my.onnx", "--base", "cnn_lstm", "--steps", "1", "--json")
+    monkeypatch.setattr(adaptation, "learned", lambda start, *_: start)
+    monkeypatch.setattr(adaptation, "WAYS", (1.0,))
+    monkeypatch.setattr(
+        adaptation, "Foretold", argparse.Namespace(sessions=lambda _: argparse.Namespace(rule=lambda *_: {}))
+    )
+    monkeypatch.setattr(command, "_write", lambda *_: None)
+    _, out, _ = run(path, "--out", "my.onnx", "--base", "cnn_lstm", "--json")
     model, own = open_model("cnn_lstm"), own_recordings([path])
     said, right = model_answers(model, own.samples), dict.fromkeys(("normal", "one"), 0)
     assert model.points is not None

@@ -17,8 +17,9 @@ def test_no_answer_of_a_shipped_model_is_another_one(monkeypatch: pytest.MonkeyP
 
     Of a non-gesture one may differ: a taxel at the very threshold of contact is in contact by one bit.
     """
-    extreme = decisions.extreme_windows
+    extreme, performed = decisions.extreme_windows, decisions.performed_windows
     monkeypatch.setattr(decisions, "extreme_windows", lambda quick: extreme(quick)[::6])
+    monkeypatch.setattr(decisions, "performed_windows", lambda _, kinds: performed(10, kinds))
     rows: list[Any] = decisions_table(LADDER, quick=True).rows
     assert {row[0] for row in rows} == set(LADDER) and len({row[1] for row in rows}) == 3
     assert [row for row in rows if row[3]] == []
