@@ -4,12 +4,11 @@ import argparse
 import json
 import sys
 import time
-from contextlib import suppress
 from typing import Any
 
 import torch
 
-from gestured.client.say import say, say_drawn
+from gestured.client.say import say
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import measured, plain, write_manifest
@@ -17,6 +16,7 @@ from gestured.lab.fit import RECURRENT
 from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
 from gestured.lab.train import TrainingPlan, load_data, train
+from gestured.lab.written import printed
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
@@ -58,8 +58,7 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     for name, of in real_figures(plan, data, args.cache).items():
         figures[name]["real"] = of
-    with suppress(BrokenPipeError):  # files are written even if nobody reads the output
-        say_drawn(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
+    printed(json.dumps(plain(figures), indent=2) if args.json else "\n".join(table(figures)))
     if args.quick and args.command == "evaluate":  # a card describes the plan that trained its model
         say("cards and manifest stay as they are: --quick judges too few gestures for them", to=sys.stderr)
     else:

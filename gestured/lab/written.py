@@ -1,10 +1,11 @@
-"""Files that anybody may read, such as reports, pages, models and caches: written whole or not at all."""
+"""Files that anybody may read, such as reports, pages, models and caches, whole or not at all; and figures printed."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from gestured.client.say import say_drawn
 from gestured.record.files import PUBLIC, atomic_write
 
 
@@ -22,3 +23,9 @@ def write(path: Path, content: str | bytes, *, durable: bool = True) -> None:
     """Replace a file by `content`, as `replaced` does."""
     with replaced(path, durable=durable) as file:
         file.write(content.encode() if isinstance(content, str) else content)
+
+
+def printed(text: str) -> None:
+    """Print figures; if their reader has gone, as `head` does, files are written all the same."""
+    with suppress(BrokenPipeError):
+        say_drawn(text)

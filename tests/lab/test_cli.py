@@ -154,13 +154,6 @@ def test_a_folder_that_cannot_be_written_to_is_named_before_anything_is_simulate
     assert {path.name for path in tmp_path.iterdir()} == {"taken", "shut"}
 
 
-def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(tmp_path / "nowhere.onnx")
-    assert main(["everyday", path, "--hours", "1"]) == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab:")]
-    assert "nowhere.onnx" in line
-
-
 @pytest.mark.parametrize(("name", "words"), [("study", "; what is finished is kept"), ("everyday", "")])
 def test_an_interrupted_run_says_where_nothing_finished_is_lost(
     name: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -310,7 +310,7 @@ def test_a_reader_who_has_gone_takes_no_file_away(tmp_path: Path, monkeypatch: p
         raise BrokenPipeError
 
     monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
-    monkeypatch.setattr(command, "tell", gone)
+    monkeypatch.setattr("gestured.lab.written.say_drawn", gone)
     assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 0
     assert (tmp_path / "curve.svg").exists()
 

@@ -3,13 +3,11 @@
 import argparse
 import json
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
-from gestured.client.say import say_drawn
 from gestured.client.values import each_once
 from gestured.core.errors import GesturedError
 from gestured.core.listening import LONGEST_S, Arming
@@ -20,7 +18,7 @@ from gestured.lab.everyday.hours import Heard, hear, points_of
 from gestured.lab.everyday.stretches import lived, recorded
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.table import Table
-from gestured.lab.written import write
+from gestured.lab.written import printed, write
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped, shipped_name
@@ -72,8 +70,7 @@ def run(args: argparse.Namespace) -> int:
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
-    with suppress(BrokenPipeError):  # files are written even if nobody reads the output
-        tell(found, shown, args.json)  # printed first, since it is the work of hours, and a disk may be full
+    tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
@@ -101,7 +98,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
     """Print the figures."""
-    say_drawn(json.dumps(found) if as_json else "\n".join(map(str, shown)))
+    printed(json.dumps(found) if as_json else "\n".join(map(str, shown)))
 
 
 def _lived(model: str, strictness: Strictness, arming: Arming | None, seed: int) -> list[Heard]:

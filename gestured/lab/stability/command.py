@@ -3,16 +3,15 @@
 import argparse
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import asdict
 
-from gestured.client.say import say_drawn
 from gestured.lab.made_of import made_of, renew, require_marks
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
 from gestured.lab.stability.filters import filters_table
 from gestured.lab.stability.stiff import day_table, stiff_table
 from gestured.lab.table import Table
+from gestured.lab.written import printed
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 
@@ -37,12 +36,11 @@ def run(args: argparse.Namespace) -> int:
         table = make(args.quick)
         done.append(asdict(table))
         if not args.json:
-            with suppress(BrokenPipeError):  # the page is written even if nobody reads the output
-                say_drawn(str(table))
+            printed(str(table))
         if args.document:
             code = WITHOUT_MODELS.get(name)
             made = made_of(args.words, [], code) if code else made_of(args.words, shipped().values())
             renew(args.document, name, [made, "", str(table)])
     if args.json:
-        say_drawn(json.dumps(done, indent=2))
+        printed(json.dumps(done, indent=2))
     return 0

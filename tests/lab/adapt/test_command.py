@@ -27,7 +27,7 @@ from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
 from tests.lab.adapt.conftest import Run
-from tests.lab.adapt.recorded import CONSENT, cut_gestures, unknown_sensor, whole_session
+from tests.lab.adapt.recorded import CONSENT, cut_gestures, unknown_sensor
 from tests.lab.test_own import drawn
 
 
@@ -170,15 +170,6 @@ def test_a_disk_without_room_for_the_model_takes_no_figures_away(
     assert capsys.readouterr() == ("right 0.9\n", "gestured-lab: my.onnx: No space left on device\n")
 
 
-@pytest.mark.hostile
-@pytest.mark.timeout(900)
-def test_one_persons_sessions_are_worth_less_and_it_says_so(run: Run, tmp_path: Path) -> None:
-    for k in range(2):
-        write(tmp_path / f"{k}.npz", whole_session("07", seed=k))
-    _, out, _ = run("0.npz", "1.npz", "--out", "my.onnx", "--steps", "1")
-    assert "nothing of other people" in out
-
-
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
@@ -217,16 +208,6 @@ def test_a_base_that_has_learned_from_a_recording_or_a_person_is_refused(run: Ru
         assert f"--base: taught has learned from a.npz, so that nobody in {name} can be held out" in err
     files = [origin["file"] for origin in command._learned_from(base_of(str(taught)), [tmp_path / "others.npz"])]
     assert files == ["old.npz", "a.npz", "others.npz"]
-
-
-def test_a_cache_that_cannot_be_made_is_told_before_anything_is_simulated(
-    base: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(command, "simulate", lambda *_: pytest.fail("simulates"))
-    write(tmp_path / "a.npz", cut_gestures(("07", "08"), GESTURES, repeats=2))
-    monkeypatch.setenv("XDG_CACHE_HOME", f"{tmp_path}/a.npz")
-    assert main(f"adapt {tmp_path}/a.npz --out {tmp_path}/my.onnx --base {base}".split()) == 1
-    assert capsys.readouterr().err == f"gestured-lab: {tmp_path}/a.npz/gestured: Not a directory\n"
 
 
 @pytest.mark.hostile

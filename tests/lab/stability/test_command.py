@@ -39,16 +39,3 @@ def test_tables_are_printed_as_they_are_done_or_as_json_and_written_into_a_page(
     assert str(TABLE) in page.read_text() and "`gestured-lab stability --quick`" in page.read_text()
     assert command.run(argparse.Namespace(quick=True, json=True, document=None)) == 0
     assert json.loads(capsys.readouterr().out)[0]["rows"][0] == ["ours", 1.234e-16, 3]
-
-
-def test_a_reader_who_has_gone_keeps_no_table_out_of_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def gone(_: str) -> None:
-        raise BrokenPipeError
-
-    monkeypatch.setattr(command, "TABLES", {name: lambda _: TABLE for name in ("one", "two")})
-    monkeypatch.setattr(command, "say_drawn", gone)
-    page = tmp_path / "page.md"
-    page.write_text(PAGE + PAGE.replace("one", "two"))
-    args = argparse.Namespace(quick=True, json=False, document=page, words="gestured-lab stability")
-    assert command.run(args) == 0
-    assert page.read_text().count(str(TABLE)) == 2

@@ -104,16 +104,3 @@ def test_what_was_not_computed_is_a_dash_or_no_table(tmp_path: Path, monkeypatch
 def test_a_program_that_draws_nothing_does_not_load_what_draws() -> None:
     code = "import gestured.lab.cli, sys; print(sorted({'matplotlib', 'jinja2'} & set(sys.modules)))"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
-
-
-def test_every_file_of_a_report_takes_the_place_of_the_one_before_as_a_whole(
-    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """So that Ctrl-C or a full disk leaves the one before."""
-    for name in ("confusion", "operating_points"):
-        monkeypatch.setattr(f"gestured.lab.study.picture.{name}", lambda _: Figure())
-    write_report(study, tmp_path)
-    before = {path: path.stat().st_ino for path in tmp_path.iterdir()}
-    write_report(study, tmp_path)
-    assert len(before) == 4 and before.keys() == set(tmp_path.iterdir())
-    assert all(path.stat().st_ino != number for path, number in before.items())
