@@ -7,6 +7,7 @@ Each half hour is of another person of experiments/foreign/life.py, from which n
 """
 
 import argparse
+import json
 from functools import partial
 
 import experiments.foreign.life as foreign
@@ -16,7 +17,7 @@ from gestured.core.points import STRICTNESS, USUAL, Strictness
 from gestured.core.scene import Setup
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import FIRST
-from gestured.lab.everyday.command import at, tell
+from gestured.lab.everyday.command import at
 from gestured.lab.everyday.hours import Heard, hear
 from gestured.lab.everyday.report import figures, tables
 from gestured.lab.everyday.stretches import Stretch
@@ -42,15 +43,15 @@ def main() -> None:
     parser.add_argument("--foreign", choices=LEVELS, default=LEVELS[0], help=f"sensors (default: {LEVELS[0]})")
     parser.add_argument("--hours", type=int, default=20, help="of two people each (default: 20)")
     parser.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
-    parser.add_argument("--seed", type=int, default=FIRST, help=f"of the first half hour (default: {FIRST})")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     args = parser.parse_args()
     work = partial(heard, args.foreign, args.model, args.strictness)
     models = at(args.model, args.strictness)
-    seeds = range(args.seed, args.seed + 2 * args.hours)
+    seeds = range(FIRST, FIRST + 2 * args.hours)
     found = figures(list(in_processes(work, seeds, args.jobs, "half hours")), models, args.strictness)
-    tell(found, tables(found, f"of the other generator, {args.foreign}"), args.json)
+    told = tables(found, f"of the other generator, {args.foreign}")
+    print(json.dumps(found) if args.json else "\n".join(map(str, told)))
 
 
 if __name__ == "__main__":

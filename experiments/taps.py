@@ -23,16 +23,17 @@ from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
+FIRST = 900  # participant; training used 0 to 33
 SESSION_S = 120.0  # of one participant; long enough for some dozens of taps
 TAPS = 100  # pairs of a single and a double tap: more than fit into a session
 
 
-def takes(people: int, seed: int) -> list[Take]:
+def takes(people: int) -> list[Take]:
     """A session of single and double taps of each new participant, on the nominal sensor."""
     kinds = [ONE_TAP, DOUBLE_TAP] * TAPS
     return [
         session(Participant(n), SimulatedSensor.nominal(day=n), generator(n, 0x7A), SESSION_S, 0.0, kinds=kinds)
-        for n in range(seed, seed + people)
+        for n in range(FIRST, FIRST + people)
     ]
 
 
@@ -56,9 +57,9 @@ def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], li
     return counts, waited
 
 
-def figures(model: str, people: int, seed: int) -> list[tuple[Value, ...]]:
+def figures(model: str, people: int) -> list[tuple[Value, ...]]:
     """A row for each wait: shares of the taps performed, and the median wait of a single tap."""
-    sessions, opened = takes(people, seed), open_model(model)
+    sessions, opened = takes(people), open_model(model)
     rows: list[tuple[Value, ...]] = []
     for wait_s in progress(WAITS_S, len(WAITS_S), "waits"):
         counts: Counter[str] = Counter()
@@ -81,10 +82,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (%(default)s)")
     parser.add_argument("--people", type=int, default=20, help="participants, two minutes of taps each (%(default)s)")
-    parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
     add_document(parser, "taps")
     args = parser.parse_args()
-    table = Table("Taps by the time in which a second one counts", HEAD, figures(args.model, args.people, args.seed))
+    table = Table("Taps by the time in which a second one counts", HEAD, figures(args.model, args.people))
     tell(table, [shipped().get(args.model, Path(args.model))], "taps", args.document)
 
 

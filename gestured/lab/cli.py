@@ -47,8 +47,7 @@ def parser() -> Parser:
     """The command line; every subcommand's help has an example."""
     from gestured.core.listening import Arming
     from gestured.core.points import STRICTNESS, USUAL
-    from gestured.lab.everyday import FIRST as FIRST_DAY
-    from gestured.lab.recordings.flags import SEED, add_recordings
+    from gestured.lab.recordings.flags import add_recordings
 
     top, commands = program(
         "gestured-lab", "COMMAND", "Train and evaluate gestured's models.",
@@ -132,8 +131,6 @@ def parser() -> Parser:
     everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
     everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "
                           "anew, such as docs/everyday.md")  # fmt: skip
-    everyday.add_argument("--seed", type=SEED, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
-                          f"default's (default: {FIRST_DAY})")  # fmt: skip
     everyday.add_argument("--jobs", type=JOBS, default=2, help="processes (default: 2)")
     stability = add("stability", "measure filters, extreme and stiff inputs through the whole path, and models by "
                     "their answers",
@@ -145,20 +142,12 @@ def parser() -> Parser:
                 "writes its tables, its figures and study.json; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
-    study.add_argument(
-        "--seeds",
-        type=number(1, 100, whole=True),
-        default=3,
-        help="seeds of each figure of the main tables (default: 3)",
-    )
     study.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `study` is written "
                        "anew, such as docs/study.md, with the picture beside it, and others whose block `choice` is, "
                        "such as docs/figures.md")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
-    study.add_argument("--seed", type=SEED, default=0,
-                       help="of splits and training: same seed, same numbers (default: 0)")  # fmt: skip
     add_data(study)
     add_recordings(add)
     return top

@@ -89,13 +89,8 @@ def test_help_needs_no_torch_and_shows_an_example_that_is_valid(tmp_path: Path) 
         "fly",
         "train --jobs many",
         "train --epochs 3",
-        "everyday --hours long",
-        "study --seed -1",
         "train --jobs 0",
-        "everyday --jobs -1",
-        f"everyday --hours {10**20}",
         "everyday --hours 0",
-        "study --seeds 0",
         "adapt no.npz --out my.onnx --steps 0",
     ],
 )

@@ -13,11 +13,10 @@ from gestured.core.errors import GesturedError
 from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
 from gestured.lab.dataset import in_processes
-from gestured.lab.everyday import report
+from gestured.lab.everyday import FIRST, report
 from gestured.lab.everyday.hours import Heard, hear, points_of
 from gestured.lab.everyday.stretches import lived, recorded
 from gestured.lab.made_of import made_of, renew, require_marks
-from gestured.lab.table import Table
 from gestured.lab.written import printed, write
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         parts = in_processes(work, range(len(args.recordings)), args.jobs, "recordings")
     else:
         work = partial(_lived, args.model, args.strictness, arming)
-        parts = in_processes(work, range(args.seed, args.seed + args.hours), args.jobs, "hours")
+        parts = in_processes(work, range(FIRST, FIRST + args.hours), args.jobs, "hours")
     heard = [one for part in parts for one in part]
     if sum(one.seconds for one in heard) < LEAST_S:
         raise GesturedError(f"{args.recordings[0]}: expected at least {LEAST_S:g} s of frames")
@@ -70,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
         shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
-    tell(found, shown, args.json)  # first, since it is the work of hours, and a disk may be full
+    # First, since it is the work of hours, and a disk may be full.
+    printed(json.dumps(found) if args.json else "\n".join(map(str, shown)))
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
@@ -94,11 +94,6 @@ def _check(args: argparse.Namespace) -> None:
         raise GesturedError("--arming: expected no --recordings and no --svg, its hours are simulated, without a curve")
     if args.svg and find_spec("matplotlib") is None:
         raise GesturedError("--svg: matplotlib is missing: pip install 'gestured[lab]', or make lab")
-
-
-def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
-    """Print the figures."""
-    printed(json.dumps(found) if as_json else "\n".join(map(str, shown)))
 
 
 def _lived(model: str, strictness: Strictness, arming: Arming | None, seed: int) -> list[Heard]:

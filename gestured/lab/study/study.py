@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     require_marks("study", *(args.document or ())[:1])
     require_marks("choice", *(args.document or ())[1:])
     args.out.mkdir(parents=True, exist_ok=True)
-    plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
+    plan = Plan.small() if args.quick else Plan()
     schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
     study = compute(plan, schedule, args.real, args.foreign)
     study["about"]["command"] = args.words

@@ -35,10 +35,10 @@ class Plan:
     minutes: float = 20.0  # of continuous sessions for each model
 
     @classmethod
-    def small(cls, seed: int) -> "Plan":
+    def small(cls) -> "Plan":
         """A plan that takes some minutes on two cores."""
         return cls(
-            seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, real=40,
+            quick=True, seeds=1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, real=40,
             timed=3, minutes=0.0,
         )  # fmt: skip
 

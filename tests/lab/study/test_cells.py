@@ -71,7 +71,7 @@ def test_other_shipped_models_are_played_again(tmp_path: Path, shelf: Path, monk
     monkeypatch.setattr(study, "online", lambda *_: ([], [{"play": next(plays)}]))
 
     def play() -> int:
-        _, ((row,)) = study.played(Plan.small(0), {}, data(), Schedule(tmp_path, 1))
+        _, ((row,)) = study.played(Plan.small(), {}, data(), Schedule(tmp_path, 1))
         return int(row["play"])
 
     assert play() == play() == 0

@@ -41,7 +41,7 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     few = [t.index for t in TRIALS if t.participant < 3 and t.speed == "normal" and t.inclination == 1]
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
     small = Plan.small
-    monkeypatch.setattr(Plan, "small", lambda seed: replace(small(seed), steps=4, timed=2))
+    monkeypatch.setattr(Plan, "small", lambda: replace(small(), steps=4, timed=2))
     for module in (cells, cohort):
         monkeypatch.setattr(module, "in_processes", lambda make, todo, *_: map(make, todo))
     write(tmp_path / "foreign.npz", recordings(1))
