@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from experiments.stall import play
 from tests.daemon.harness import Daemon, Sensor
 from tests.hostile.grammar import TYPES, violations
+from tests.hostile.stall import play
 from tests.hostile.test_network import play as send
 from tests.hostile.test_network import swipe
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.stall import Result, play
+from tests.hostile.stall import Result, play
 
 
 def check(result: Result) -> None:

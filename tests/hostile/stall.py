@@ -1,20 +1,15 @@
-"""What a stall of the daemon costs: `python -m experiments.stall --sensors 100 --rate 15 --stall 3`.
+"""What a stall of the daemon costs.
 
 Simulated hands swipe and tap on many sensors, in real time, without frame counters. The daemon's process is stopped for
 a while, and continued. As long as the kernel's buffer holds the packets, every gesture should be recognised as if
 nothing had happened; if it overflows, gestures may be missed, but none may be made up.
 """
 
-import argparse
-import json
 import select
 import signal
-import sys
-import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from gestured.record.judge import Performed, Tally
@@ -118,31 +113,3 @@ def play(  # noqa: PLR0913 - each is a quantity of its own
 def listen(client: Client) -> list[dict[str, Any]]:
     """The lines still to come, until all sensors are stale."""
     return client.until(lambda line: line["type"] == "status" and all(s == "stale" for s in line["sensors"].values()))
-
-
-def main() -> int:
-    """Print what became of the gestures; returns 1 if one was wrong, made up, or missed without a lost packet."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
-    parser.add_argument("--sensors", type=int, default=40)
-    parser.add_argument("--rate", type=float, default=15.0, help="frames a second of each sensor (default: 15)")
-    parser.add_argument("--stall", type=float, default=1.0, help="seconds for which the daemon stands still")
-    parser.add_argument("--rubbish", type=int, default=0, help="packets that a stranger sends meanwhile (default: 0)")
-    parser.add_argument("--seconds", type=float, default=14.0, help="in all (default: 14)")
-    parser.add_argument("--json", action="store_true")
-    args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        many = max(64, args.sensors)
-        daemon = Daemon.start(Path(folder), args.model, "--metrics", "127.0.0.1:0", "--max-sensors", many)
-        try:
-            result = play(daemon, args.sensors, args.rate, args.stall, args.seconds, args.rubbish)
-        finally:
-            daemon.stop()
-    found = result.verdicts
-    print(json.dumps(found | {"unknown": result.unknown}) if args.json else result)
-    bad = found["wrong"] + found["false"] + (0 if result.kernel_drops else found["missed"])
-    return 1 if bad or result.violations else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
