@@ -91,13 +91,6 @@ def test_more_evidence_for_none_never_makes_it_less_unknown() -> None:
         last = unknown
 
 
-def test_evidence_for_none_does_not_change_which_gesture_it_would_be() -> None:
-    one, two, labels = two_opinions(2000, 3)
-    fitted = fit_decision(one, two, labels, GESTURES)
-    lean = torch.cat([torch.zeros(GESTURES), 3 * torch.ones(KINDS)])
-    torch.testing.assert_close(said(fitted, one + lean, two + lean)[0], said(fitted, one, two)[0])
-
-
 def test_two_opinions_that_disagree_are_less_sure_than_two_that_agree() -> None:
     one, two, labels = two_opinions(4000, 4)
     fitted = fit_decision(one, two, labels, GESTURES)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import pytest
 import torch
 from sklearn.ensemble import RandomForestClassifier
@@ -162,7 +161,7 @@ def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("gestures", ("one_tap", "swipe_up")), ("gestures", ("A", "B", "C")), ("training_data", "unknown")],
+    [("gestures", ("one_tap", "swipe_up")), ("training_data", "unknown")],
 )
 def test_metadata_that_would_be_refused_is_not_written(key: str, value: Any, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="not written"):
@@ -274,11 +273,3 @@ def test_a_manifest_that_is_none_is_named(text: str, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(ModelError, match=r"manifest\.json: expected what gestured-lab evaluate writes"):
         measured(tmp_path / "cnn_lstm.onnx")
-
-
-def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: tuple[Net, Path], tmp_path: Path) -> None:
-    proto = onnx.load(net[1])
-    del proto.metadata_props[:]
-    onnx.save(proto, tmp_path / "silent.onnx")
-    with pytest.raises(ModelError, match=r"silent\.onnx"):
-        write_manifest(tmp_path, {})

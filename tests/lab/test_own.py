@@ -10,7 +10,7 @@ from gestured.core.errors import ModelError
 from gestured.core.own import EXAMPLES
 from gestured.lab.own import learn as own
 from gestured.lab.own.learn import Seen, learn, played_through, teach
-from gestured.lab.own.play import JUDGED, LEARNED, PLAN, REPETITIONS, SIGNS, repeated, sign
+from gestured.lab.own.play import LEARNED, PLAN, REPETITIONS, repeated, sign
 from gestured.lab.samples import Sample, Samples, collect
 from gestured.model.context import CALM
 from gestured.model.model import Model
@@ -68,11 +68,6 @@ def test_a_repetition_is_the_same_again_but_for_the_hand() -> None:
         assert 0 <= one.contacts[0].x.min() and one.contacts[0].x.max() <= extent[0]
         way = [np.corrcoef(getattr(one.contacts[0], axis), getattr(plan.contacts[0], axis))[0, 1] for axis in "xy"]
         assert min(way) > 0.8
-
-
-def test_signs_to_judge_by_are_not_those_that_were_learned_from() -> None:
-    assert not set(LEARNED) & set(JUDGED)
-    assert set(LEARNED) | set(JUDGED) == set(SIGNS)
 
 
 def window(rng: np.random.Generator, angle: float) -> np.ndarray:

@@ -20,14 +20,14 @@ from gestured.lab.cli import main
 from gestured.lab.decide import confidence
 from gestured.lab.evaluate import model_answers
 from gestured.lab.own.learn import Seen
-from gestured.lab.recordings.origin import KEY, origins, said
+from gestured.lab.recordings.origin import KEY, origins
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
 from tests.lab.adapt.conftest import Run
-from tests.lab.adapt.recorded import CONSENT, cut_gestures, unknown_sensor
+from tests.lab.adapt.recorded import cut_gestures, unknown_sensor
 from tests.lab.test_own import drawn
 
 
@@ -41,30 +41,6 @@ def sluggish(tmp_path: Path) -> Path:
     path = tmp_path / "sluggish.npz"
     write(path, replace(made, frames=frames))
     return path
-
-
-@pytest.mark.hostile
-@pytest.mark.timeout(900)
-def test_a_model_that_is_written_says_whom_it_learned_from(
-    run: Run, base: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "mine.npz"
-    write(path, cut_gestures(("07", "08"), GESTURES, repeats=1))
-    status, out, err = run(path, "--out", "my.onnx", "--steps", "1", "--force", "--json")
-    found = json.loads(out)
-    assert status == 0, err
-    assert found["after"]["own"]["wrong"]["share"] <= found["before"]["own"]["wrong"]["share"]
-    assert found["held_out"]["unit"] == "people" and found["people"] == 2
-    model = open_model(tmp_path / "my.onnx")
-    assert model.threshold == pytest.approx(found["threshold"], abs=1e-4)
-    origins = said(tmp_path / "my.onnx")
-    assert origins is not None
-    assert origins[-1].file == "mine.npz" and origins[-1].subjects == ["07", "08"]
-    assert origins[-1].consents == dict.fromkeys(("07", "08"), CONSENT)
-    assert origins[:-1] == said(base)  # and whom its base had learned from
-    main(["forget", "07", str(path), "--models", str(tmp_path), "--dry-run"])
-    out = capsys.readouterr().out
-    assert "learned from a 07, in mine.npz; weights cannot forget" in out
 
 
 @pytest.mark.slow

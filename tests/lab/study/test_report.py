@@ -1,8 +1,6 @@
 """The report as a reader meets it: every figure of the study in its tables, its pictures, the table of choices."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -99,8 +97,3 @@ def test_what_was_not_computed_is_a_dash_or_no_table(tmp_path: Path, monkeypatch
     text = write_report(study, tmp_path).read_text("utf-8")
     assert "None" not in text and "Continuous sessions" not in text and "run time" not in text
     assert "A quick run" in text
-
-
-def test_a_program_that_draws_nothing_does_not_load_what_draws() -> None:
-    code = "import gestured.lab.cli, sys; print(sorted({'matplotlib', 'jinja2'} & set(sys.modules)))"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
