@@ -7,7 +7,7 @@ import numpy as np
 
 from gestured.lab.recordings.store import touched
 from gestured.record.recordings import Recordings
-from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take, session
+from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take, session
 
 CONSENT = "2026-01-31"
 
@@ -22,31 +22,26 @@ def unknown_sensor(seed: int) -> SimulatedSensor:
 def cut_gestures(
     people: Sequence[str], labels: Sequence[str], *, repeats: int = 1, sensor: SimulatedSensor | None = None
 ) -> Recordings:
-    """Each person performs each of `labels` (kinds of the simulator), `repeats` times."""
-    takes, names, subjects = [], [], []
-    for k, person in enumerate(people):
-        for n, label in enumerate(list(labels) * repeats):
-            on = sensor or SimulatedSensor.nominal(day=70 + k)
-            takes.append(gesture_take(label, Participant(500 + k), on, generator(31, k, n)))
-            names.append(label)
-            subjects.append(person)
-    return together(takes, names, subjects)
+    """Each person performs each of `labels` (kinds of the simulator), `repeats` times.
 
-
-def together(takes: Sequence[Take], names: Sequence[str], subjects: Sequence[str]) -> Recordings:
-    """Takes of one gesture each, with the marks of the front end; what it does not see as one is left away."""
-    marks = [touched(take.frames, take.times) for take in takes]
-    kept = [i for i, mark in enumerate(marks) if mark is not None]
-    both = np.array([marks[i] for i in kept])
-    lengths = [len(takes[i].frames) for i in kept]
+    The marks are the front end's; what it does not see as one contact is left away.
+    """
+    takes = [
+        (gesture_take(label, Participant(500 + k), sensor or SimulatedSensor.nominal(day=70 + k), generator(31, k, n)),
+         label, person)
+        for k, person in enumerate(people) for n, label in enumerate(list(labels) * repeats)
+    ]  # fmt: skip
+    seen = [(touched(take.frames, take.times), take, label, person) for take, label, person in takes]
+    marks, kept, names, subjects = zip(*(one for one in seen if one[0] is not None), strict=True)
+    onsets, releases = np.array(marks).T
     return Recordings(
-        frames=np.concatenate([takes[i].frames for i in kept]),
-        times=np.concatenate([takes[i].times for i in kept]),
-        offsets=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-        labels=np.array([names[i] for i in kept]),
-        subjects=np.array([subjects[i] for i in kept]),
-        onsets=both[:, 0],
-        releases=both[:, 1],
+        frames=np.concatenate([take.frames for take in kept]),
+        times=np.concatenate([take.times for take in kept]),
+        offsets=np.cumsum([0, *(len(take.frames) for take in kept)], dtype=np.int64),
+        labels=np.array(names),
+        subjects=np.array(subjects),
+        onsets=onsets,
+        releases=releases,
         consents=np.array([CONSENT] * len(kept)),
     )
 

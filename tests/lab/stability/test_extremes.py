@@ -1,18 +1,12 @@
 """What no sensor should send: nothing that is not finite comes out, and a swipe stays a swipe."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Segment
-from gestured.core.window import Window
-from gestured.lab.samples import WINDOW
-from gestured.lab.stability.decisions import segment_cases
 from gestured.lab.stability.extremes import Case, Series, fault, streams, swipes, swipes_found, whole_path_table
-from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
@@ -21,24 +15,6 @@ from gestured.model.shipped import LADDER
 @pytest.fixture(scope="module")
 def models() -> list[Model]:
     return [open_model(name) for name in LADDER]
-
-
-WINDOWS = (
-    WINDOW,
-    Window(9, 9, 15.0, 3, 1 / 15, 1 / 15, 4.0),
-    Window(5, 7, 60.0, 1, 1 / 15, 1 / 15, 4.0),
-    Window(27, 15, 5.0, 1, 1 / 15, 1 / 15, 0.0),
-)
-
-
-@pytest.mark.filterwarnings("error")
-def test_windows_and_features_bear_every_segment() -> None:
-    segments = list(segment_cases(quick=True))
-    assert len(segments) > 150
-    for window, segment in product(WINDOWS, segments):
-        made = window.apply(segment)
-        assert len(made) and made.min() >= 0.0 and made.max() <= 1.0 + 1e-6
-        assert np.isfinite(touch_pattern(made, window.rate_hz)).all()
 
 
 def test_the_whole_path_bears_every_stream(models: list[Model]) -> None:
