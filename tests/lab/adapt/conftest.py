@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from gestured.lab import export
 from gestured.lab.adapt import command
 from gestured.lab.adapt.learning import Simulated
 from gestured.lab.adapt.weights import untrained
@@ -29,7 +30,7 @@ def some(seed: int, count: int) -> Samples:
 
 @pytest.fixture(scope="session")
 def small_world() -> Simulated:
-    return Simulated(some(31, 60), some(32, 60), some(34, 60), some(33, 60), np.zeros(0, np.int64))
+    return Simulated(some(31, 60), some(32, 60), some(34, 20), some(33, 60), np.zeros(0, np.int64))
 
 
 @pytest.fixture(scope="session")
@@ -53,6 +54,7 @@ def little(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
     monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
     monkeypatch.setattr(own, "FOLDS", 2)
+    monkeypatch.setattr(export, "CHECKED_LENGTHS", (1, 15))
 
 
 @pytest.fixture
