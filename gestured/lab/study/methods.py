@@ -44,15 +44,10 @@ class Estimator:
     classes: int
 
     def scores(self, inputs: NDArray[np.float32], index: Indices) -> NDArray[np.float64]:
-        """(n, K); an SVM's decision values as a softmax, which is not calibrated."""
-        if hasattr(self.fitted, "predict_proba"):
-            found = self.fitted.predict_proba(inputs[index])
-        else:
-            values = self.fitted.decision_function(inputs[index])
-            powers = np.exp(values - values.max(axis=1, keepdims=True))
-            found = powers / powers.sum(axis=1, keepdims=True)
-        out = np.zeros((len(index), self.classes))
-        out[:, self.fitted.classes_] = found
+        """(n, K) probabilities, or an SVM's decision values; the least of all for a class that was not learned."""
+        ask = getattr(self.fitted, "predict_proba", None) or self.fitted.decision_function
+        out = np.full((len(index), self.classes), -np.inf)
+        out[:, self.fitted.classes_] = ask(inputs[index])
         return out
 
 
