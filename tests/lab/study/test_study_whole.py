@@ -12,7 +12,7 @@ from experiments.foreign.recordings import recordings
 from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.made_of import LINE
-from gestured.lab.study import cells, cohort
+from gestured.lab.study import cells, cohort, run_time
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
@@ -40,6 +40,8 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     monkeypatch.setitem(METHODS, "tp_rf", replace(METHODS["tp_rf"], grid=small_forest))
     few = [t.index for t in TRIALS if t.participant < 3 and t.speed == "normal" and t.inclination == 1]
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
+    monkeypatch.setattr(Plan, "trials_of", lambda self, people: np.array(few[:10], np.int64))
+    monkeypatch.setattr(run_time, "WARM", 1)
     small = Plan.small
     monkeypatch.setattr(Plan, "small", lambda: replace(small(), steps=4, timed=2))
     for module in (cells, cohort):
