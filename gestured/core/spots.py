@@ -56,10 +56,12 @@ class Peak(NamedTuple):
 def spots(frame: Array, shape: tuple[int, int], noise: float) -> list[Spot]:
     """The fingers in a frame of R x C taxels, the strongest first: one, or two that can be told apart.
 
-    `frame`: (R * C,) counts above the baseline, row by row.
+    `frame`: (R * C,) counts above the baseline, row by row. If none of them is above it, there is no finger.
     """
     first, second = _peaks(frame, shape, noise)
     level = frame.item(first.taxel)
+    if level <= 0:
+        return []
     strong = frame > level / 2
     if second is None:
         return [_new(Spot, (*_place(frame, first), level, int(np.count_nonzero(strong))))]

@@ -45,6 +45,7 @@ class Hand:
     def __init__(self, subject: Sensor, rate_hz: float = 15.0, unit: float = 1.0) -> None:
         self.subject, self.rate_hz, self.unit, self.t = subject, rate_hz, unit, 0.0
         self.grid, self.width = subject.front_end.grid_sent, 0.8  # of a finger, in pitches
+        self.below = 0.0  # counts by which all taxels lie below the idle sensor
         self._random = np.random.default_rng(0)
         self.told: list[Event] = []
         self.rests(2.0)
@@ -54,7 +55,7 @@ class Hand:
         count, before = round(seconds * self.rate_hz), len(self.told)
         for k in range(count):
             self.t += 1 / self.rate_hz
-            values = 300 + self._random.normal(0, 2, self.grid)
+            values = 300 - self.below + self._random.normal(0, 2, self.grid)
             values += drawn(*path(k / count), grid=self.grid, width=self.width, peak=peak)
             self.told += run(self.subject, [Frame(self.t, self.unit * values)])
         return [one for one in self.told[before:] if isinstance(one, Touch)]
@@ -185,6 +186,15 @@ def test_a_finger_that_keeps_moving_is_one_touch_beyond_the_longest_gesture() ->
     assert [one.phase for one in told if one.phase != "move"] == ["down", "up"]
     truth = [4 + 3 * math.sin(40 * (one.t - told[0].t) / 20.0) for one in told]
     assert max(abs(8 * one.x - at) for one, at in zip(told, truth, strict=True)) < 0.5
+    checked(hand.told)
+
+
+def test_nothing_is_followed_in_frames_that_lie_below_the_idle_sensor_as_a_whole() -> None:
+    hand = Hand(sensor())
+    hand.below = 9.0  # less than is taken for a restart; what stands out from the rest is a contact
+    hand.does(3.0, lambda share: [(4, 4 + 3 * math.sin(20 * share))], peak=12.0)
+    hand.rests(1.0)
+    assert any(isinstance(one, Onset) for one in hand.told)
     checked(hand.told)
 
 
