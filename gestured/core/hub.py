@@ -188,11 +188,11 @@ class Hub:
         """Go on in another scene; what was learned of a sensor stays if it still holds. ValueError as for a new hub."""
         facts = self.wait(now)  # a contact that is over is answered by the scene before
         unheard = [name for name in {**self.scene.sensors, **scene.sensors} if name not in self._sensors]
-        armed = {name for name in unheard if self.scene.arming_of(name) is not None}
+        told = {gate.sensor: (gate.armed, gate.closed) for gate in self.listening(now)}
         self._set(scene, classifier)
         for name in unheard:
             gate = self._unheard(name, now).gate
-            if gate is not None and (name in armed) != (gate.armed is not None):
+            if gate is not None and (gate.armed, gate.closed) != told.get(name, (None, ())):
                 facts.append(gate)
         for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)
