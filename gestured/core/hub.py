@@ -190,9 +190,10 @@ class Hub:
         unheard = [name for name in {**self.scene.sensors, **scene.sensors} if name not in self._sensors]
         told = {gate.sensor: (gate.armed, gate.closed) for gate in self.listening(now)}
         self._set(scene, classifier)
-        for name in unheard:
-            gate = self._unheard(name, now).gate
-            if gate is not None and (gate.armed, gate.closed) != told.get(name, (None, ())):
+        listening = {gate.sensor: gate for gate in self.listening(now)}
+        for name in unheard:  # one that the scene no longer names is told to have neither gates nor arming
+            gate = listening.get(name) or Gate(name, None, (), None, now)
+            if (gate.armed, gate.closed) != told.get(name, (None, ())):
                 facts.append(gate)
         for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)

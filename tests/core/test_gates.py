@@ -132,12 +132,13 @@ def test_a_reload_without_arming_tells_of_a_sensor_of_the_scene_before_it_is_hea
 
 
 @pytest.mark.parametrize("armed", [False, None])
-def test_a_reload_that_names_a_sensor_tells_of_it_before_it_is_heard(armed: bool | None) -> None:
+def test_a_reload_that_names_a_sensor_or_no_longer_does_tells_of_it_before_it_is_heard(armed: bool | None) -> None:
     before = replace(SCENE, arming=Arming("double_tap") if armed is False else None, gates=("door",))
     hub, after = Hub(before, Sure()), replace(before, sensors={"arm": Setup()})
     assert not hub.listening(0.0)
     assert gates(hub.change(after, Sure(), 1.0)) == [("arm", armed, ("door",))] == gates(hub.listening(1.0))
     assert not hub.change(after, Sure(), 2.0)
+    assert gates(hub.change(before, Sure(), 3.0)) == [("arm", None, ())] and not hub.listening(3.0)
 
 
 def test_whoever_closes_a_gate_again_sets_its_time_anew_for_one_sensor_or_for_all() -> None:
