@@ -1,6 +1,7 @@
 """The TUIO 1.1 sink: fingers as cursors (`/tuio/2Dcur`) over UDP. Each sensor is a source of TUIO."""
 
 import socket
+import time
 from dataclasses import dataclass, field
 
 from gestured.core.address import Address
@@ -24,10 +25,9 @@ class Cursor:
 
 @dataclass(slots=True)
 class Source:
-    """One sensor: its fingers by contact and number, and the frames that were sent of it."""
+    """One sensor: its fingers by contact and number."""
 
     cursors: dict[tuple[int, int], Cursor] = field(default_factory=dict)
-    frames: int = 0
     idle: bytes = b""  # the packet of a frame without fingers, but for its last four bytes, the frame's number
 
 
@@ -41,6 +41,9 @@ class TuioSink(UdpOut):
         self._sources: dict[str, Source] = {}  # by sensor
         self._host = socket.gethostname()
         self._sessions = 0
+        # The last frame's number. Programs drop frames with numbers below those that they have seen, many whatever the
+        # source is, so all sensors share it, and it begins above those of an earlier start.
+        self._frames = int(1000 * time.time()) % IDS
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Send where a finger is, or that it has left; with the status, which fingers are down."""
@@ -62,9 +65,9 @@ class TuioSink(UdpOut):
             self._bundle(event.sensor, cursors[key], event)
 
     def take_over(self, before: UdpOut) -> None:
-        """Go on with the same fingers and numbers: a client drops frames with numbers below those it has seen."""
+        """Go on with the same fingers and numbers."""
         if isinstance(before, TuioSink) and before.destination == self.destination:
-            self._sources, self._sessions = before._sources, before._sessions
+            self._sources, self._sessions, self._frames = before._sources, before._sessions, before._frames
             before._sources = {}
 
     def close(self) -> None:
@@ -78,9 +81,9 @@ class TuioSink(UdpOut):
         """Send a frame of a sensor: the fingers that are down, and perhaps how one moved. TUIO's y grows downward."""
         source = self._sources[sensor]
         alive = [one.session for one in source.cursors.values()]
-        source.frames = (source.frames + 1) % IDS
+        self._frames = (self._frames + 1) % IDS
         if source.idle and not alive:
-            self.send(source.idle + source.frames.to_bytes(4, "big"))
+            self.send(source.idle + self._frames.to_bytes(4, "big"))
             return
         messages = [
             self._out.message(CURSOR, "ss", ("source", f"gestured/{sensor}@{self._host}")),
@@ -94,7 +97,7 @@ class TuioSink(UdpOut):
             cursor.t, cursor.speed = moved.t, speed
             place = (cursor.session, moved.x, 1.0 - moved.y, right, down, faster)
             messages.append(self._out.message(CURSOR, "sifffff", ("set", *place)))
-        messages.append(self._out.message(CURSOR, "si", ("fseq", source.frames)))
+        messages.append(self._out.message(CURSOR, "si", ("fseq", self._frames)))
         packet: bytes = self._out.bundle(*messages).dgram
         if not alive:
             source.idle = packet[:-4]

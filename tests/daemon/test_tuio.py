@@ -71,28 +71,43 @@ def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.soc
     sink.publish(event, 0.0)
     source, *rest = sent()
     assert source == ["source", f"gestured/arm@{socket.gethostname()}"]
-    assert rest == [["alive", 0], ["set", 0, 0.25, 0.25, 0.0, 0.0, 0.0], ["fseq", 1]]
+    first = rest[2][1]
+    assert rest == [["alive", 0], ["set", 0, 0.25, 0.25, 0.0, 0.0, 0.0], ["fseq", first]]
     sink.publish(Touch("arm", 7, 1, "move", 10.0, 0.5, 0.5, 0.1, 0.0, 100.0, 4), 0.0)  # of which no `down` was seen
-    assert sent()[1:] == [["alive", 0, 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", 2]]
+    assert sent()[1:] == [["alive", 0, 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 1]]
     sink.publish(Touch("arm", 7, 0, "move", 10.5, 0.5, 0.875, 0.25, 0.125, 100.0, 4), 0.0)
     speed = pytest.approx((0.5**2 + 0.25**2) ** 0.5 / 0.5, rel=1e-6)
     assert sent()[2] == ["set", 0, 0.5, 0.125, 0.5, -0.25, speed]
     sink.publish(Status("ok", {"arm": "ok", "leg": "ok"}, "m", 1.0), 0.0)
-    assert [sent()[1:] for _ in "12"] == [[["alive", 0, 1], ["fseq", 4]], [["alive"], ["fseq", 1]]]
+    assert [sent()[1:] for _ in "12"] == [[["alive", 0, 1], ["fseq", first + 3]], [["alive"], ["fseq", first + 4]]]
     sink.publish(Touch("arm", 7, 0, "up", 11.0, 0.5, 0.875, 0.0, 0.0, 100.0, 4), 0.0)
-    assert sent()[1:] == [["alive", 1], ["fseq", 5]]
+    assert sent()[1:] == [["alive", 1], ["fseq", first + 5]]
     sink.publish(Status("ok", {"leg": "ok"}, "m", 1.0), 0.0)
-    assert sent() == [["source", f"gestured/leg@{socket.gethostname()}"], ["alive"], ["fseq", 2]]
-    assert sent()[1:] == [["alive", 1], ["fseq", 6]]
+    assert sent() == [["source", f"gestured/leg@{socket.gethostname()}"], ["alive"], ["fseq", first + 6]]
+    assert sent()[1:] == [["alive", 1], ["fseq", first + 7]]
     again = TuioSink(Address(*udp.getsockname()), Metrics())  # as at a reload: the finger stays who it was
     again.take_over(sink)
     sink.close()
     again.publish(Touch("arm", 7, 1, "move", 12.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
-    assert sent()[1:] == [["alive", 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", 7]]  # lower numbers are late
+    assert sent()[1:] == [["alive", 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 8]]
     again.publish(Touch("arm", 8, 0, "down", 12.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
     assert sent()[1][:3] == ["alive", 1, 2]
     again.close()  # which tells programs that draw that no finger is left
-    assert [sent()[1:] for _ in "12"] == [[["alive"], ["fseq", 3]], [["alive"], ["fseq", 9]]]
+    assert [sent()[1:] for _ in "12"] == [[["alive"], ["fseq", first + n]] for n in (10, 11)]
+
+
+def test_frames_go_on_where_those_of_an_earlier_start_ended(
+    udp: socket.socket, sent: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Programs drop frames whose numbers are a little lower than those that they have seen."""
+    numbers = []
+    for t in (1.7e9, 1.7e9 + 1):
+        monkeypatch.setattr("gestured.daemon.tuio.time.time", lambda t=t: t)
+        sink = TuioSink(Address(*udp.getsockname()), Metrics())
+        for _ in range(60):
+            sink.publish(Status("ok", {"arm": "ok"}, "m", 1.0), 0.0)
+            numbers.append(sent()[-1][1])
+    assert numbers == sorted(set(numbers)) and 0 < numbers[0] < numbers[-1] < 2**31
 
 
 def test_it_needs_touch_events(model: Path) -> None:
