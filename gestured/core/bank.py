@@ -7,7 +7,7 @@ last bit: `matmul` of a stack of grids gives what `dot` gives for each, and expo
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from itertools import combinations, repeat
 from typing import Any
 
@@ -58,6 +58,7 @@ NAMES = (
     "expected", "before", "pause", "came",
 )  # fmt: skip
 COLUMN = {name: n for n, name in enumerate(NAMES)}
+TURNS = 4  # ticks of the hub in which each sensor in a bank is shown once
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # tables by taxel: of `Idle`, `Conditioner`, and the last frame sent
 
 
@@ -67,6 +68,8 @@ class Banks:
     def __init__(self) -> None:
         self._banks: dict[tuple[int, ...], Bank] = {}
         self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: the kind of its bank
+        self.states: dict[str, str] = {}  # by sensor in a bank: its state, as of when it was shown last
+        self._turn = 0
         self.doubted: set[str] = set()  # sensors, in banks or not, whose next frame may come after lost ones
 
     def enter(self, sensor: Sensor) -> None:
@@ -85,10 +88,12 @@ class Banks:
             bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, *kind[-2:]))
             bank.enter(sensor)
             self.homes[sensor.name] = kind
+            self.tell(sensor)
 
     def leave(self, sensor: Sensor) -> None:
         """Move what is known of a sensor that is in a bank back into its objects."""
         kind = self.homes.pop(sensor.name)
+        self.states.pop(sensor.name, None)
         if len(self._banks[kind]) == 1:
             self._banks.pop(kind).leave(sensor.name)  # an empty bank would keep its memory
         else:
@@ -97,12 +102,23 @@ class Banks:
     def show(self) -> None:
         """Copy what readings tell, and when sensors were heard, into their objects; they stay in their banks."""
         for bank in self._banks.values():
-            bank.show()
+            bank.show(range(TURNS))
 
-    def review(self) -> None:
-        """All sensors were reviewed; see `Vitals.review`."""
+    def silent(self, since: float) -> list[str]:
+        """The sensors in banks that were heard last before `since` (s)."""
+        return [name for bank in self._banks.values() for name in bank.silent(since)]
+
+    def tick(self) -> list[Sensor]:
+        """Show the sensors whose turn it is, since a thousand at once would delay every answer; returns them."""
+        self._turn = (self._turn + 1) % TURNS
+        shown = [sensor for bank in self._banks.values() for sensor in bank.show((self._turn,))]
         for bank in self._banks.values():
             bank.review()
+        return shown
+
+    def tell(self, sensor: Sensor) -> None:
+        """Keep the state of a sensor that was shown just now."""
+        self.states[sensor.name], _ = sensor.condition(sensor.owner.heard)
 
     def take(
         self, blocks: Sequence[Block], sources: Sequence[Source], others: set[str], now: float, facts: list[Fact]
@@ -197,10 +213,11 @@ class Bank:
         self._recover.pop(row, None)
         self._free.append(row)
         (last, new, _, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
-         usual, scale, active, count, _, *together) = self._known[row].tolist()  # fmt: skip
+         usual, scale, active, count, expected, *together) = self._known[row].tolist()  # fmt: skip
+        front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
+        vitals.interval_s = expected
         if not count:
             return
-        front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
         conditioner, cutter = front.conditioner, front.cutter
         idle, activity = conditioner.idle, conditioner.activity
         owner.heard = owner.source_heard = vitals.last = stamper.arrived = arrived
@@ -230,21 +247,32 @@ class Bank:
         if front.rows != front.columns:
             sensor.habits.see(front)  # `habits` compares contacts with the last idle frame
 
-    def show(self) -> None:
-        """Copy what readings tell, and when sensors were heard, into their objects."""
-        rows = list(self._rows.values())
+    def show(self, turns: Container[int]) -> list[Sensor]:
+        """Copy what readings tell, and when sensors were heard, into the objects of those whose turn it is.
+
+        Returns these sensors.
+        """
+        pairs = zip(self._sensors.values(), self._rows.values(), strict=True)
+        at = [(sensor, row) for sensor, row in pairs if row % TURNS in turns]
+        rows = [row for _, row in at]
         told = [COLUMN[name] for name in ("last", "arrived", "interval", "jitter", "level")]
         known = self._known[rows][:, told].tolist()
-        for sensor, counts, (last, heard, interval, jitter, level) in zip(
-            self._sensors.values(), self._taxels[COUNTS][rows], known, strict=True
+        for (sensor, _), counts, (last, heard, interval, jitter, level) in zip(
+            at, self._taxels[COUNTS][rows], known, strict=True
         ):
             sensor.owner.heard = sensor.owner.source_heard = sensor.stamper.arrived = sensor.vitals.last = heard
             sensor.stamper.last = last
             sensor.front_end.pace.interval_s, sensor.vitals.jitter_s = interval, jitter
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
+        return [sensor for sensor, _ in at]
+
+    def silent(self, since: float) -> list[str]:
+        """The sensors that were heard last before `since` (s)."""
+        arrived = self._known[list(self._rows.values()), COLUMN["arrived"]]
+        return [name for (name, _), late in zip(self._rows, (arrived < since).tolist(), strict=True) if late]
 
     def review(self) -> None:
-        """All sensors were reviewed: from now on jitter is computed with their present intervals."""
+        """From now on jitter is computed with the sensors' present intervals, as by `Vitals.review`."""
         self._known[:, COLUMN["expected"]] = self._known[:, COLUMN["interval"]]
 
     def take(

@@ -47,7 +47,6 @@ class Hub:
         self.owners: Mapping[Source, int] = {}
         self._foreseen: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
-        self._ticked = -math.inf  # s, the last tick
         # s: `wait` finds nothing before this time, and from then on probably something; infinite if no sensor waits.
         self.due = math.inf
         self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
@@ -152,17 +151,18 @@ class Hub:
         """Do what the time alone decides (`wait`, silences, gates, arming), after all that arrived until `now`."""
         facts = [] if now < self.gates.due else self._shut(now, partial(self.gates.lapse, now))
         facts += self.wait(now)
+        for name in self._banks.silent(now - self.scene.stale_s):
+            self._leave(self._sensors[name], now, facts)
+        for sensor in self._banks.tick():
+            sensor.review(now, facts)
+            self._banks.tell(sensor)
         sensors = self._sensors.values()
-        self._banks.show()
-        self._ticked = now
         self.owners = Counter(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
-        for sensor in sensors:
+        for sensor in [sensor for sensor in sensors if sensor.name not in self._banks.homes]:
             sensor.review(now, facts)
             if not sensor.silent and sensor.stale(now):
                 facts.append(Changed(sensor.name, "silent", sensor.owner.source))
-                self._leave(sensor, now, facts)
                 sensor.end(now, facts)
-        self._banks.review()
         return facts
 
     def flush(self, now: float) -> list[Fact]:
@@ -268,11 +268,12 @@ class Hub:
     def states(self, now: float) -> dict[str, str]:
         """The state of each sensor, as `readings` has it, in a fraction of the time."""
         silent = dict.fromkeys(self.scene.sensors, "no_data")
-        return silent | {name: sensor.condition(self._as_of(sensor, now))[0] for name, sensor in self._sensors.items()}
+        shown = self._banks.states
+        return silent | {name: shown.get(name) or sensor.condition(now)[0] for name, sensor in self._sensors.items()}
 
     def _as_of(self, sensor: Sensor, now: float) -> float:
-        """The time in s for which a sensor's state is known: `now`, or the last tick or packet of one in a bank."""
-        return min(now, max(self._ticked, sensor.owner.heard)) if sensor.name in self._banks.homes else now
+        """The time in s for which a sensor's state is known: `now`, or when one in a bank was heard as last shown."""
+        return min(now, sensor.owner.heard) if sensor.name in self._banks.homes else now
 
     def listening(self, now: float) -> list[Gate]:
         """The gates and the arming of each sensor at `now`, without the sensors that have neither."""

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gestured.core import bank
-from gestured.core.bank import FEW, Bank
+from gestured.core.bank import FEW, TURNS, Bank
 from gestured.core.events import Gate
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.hub import Hub
@@ -102,6 +102,12 @@ def reads(seed: int) -> list[Read]:
     return found
 
 
+def shown(hub: Hub, now: float) -> None:
+    """Have the hub show what is known of all sensors; of those in banks, each tick shows some."""
+    for _ in range(TURNS):
+        hub.tick(now)
+
+
 def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]], list[object]]:
     """What was said of each sensor, but for how its frames arrived; and from time to time all that is known of it."""
     hub, said, known = Hub(SCENE, Sure()), {name: list[Fact]() for name in SETUPS}, list[object]()
@@ -121,11 +127,12 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
             else:
                 said.setdefault(str(getattr(fact, "sensor", None)), []).append(fact)
         if n % 15 == 14:
-            hub.tick(now)  # of sensors in banks, readings are as of the last tick
+            shown(hub, now)
             for name, reading in sorted(hub.readings(now).items()):
                 baseline = b"" if reading.baseline is None else reading.baseline.tobytes()
                 known.append((name, baseline, counts[name].tolist()))
-                known.append(repr(replace(reading, first=None, baseline=None)))
+                gate = reading.gate and replace(reading.gate, since=0.0)  # the time for which this is known
+                known.append(repr(replace(reading, first=None, baseline=None, gate=gate)))
     return said, known
 
 
@@ -176,7 +183,7 @@ def test_a_sensor_that_sends_on_is_no_longer_intermittent(missed: int | None, mo
                 if k == missed:
                     hub.missed()
                 hub.receive([(packet, SOURCE) for packet in packets], k / 15)
-            hub.tick(k / 15)
+            shown(hub, k / 15)
             states += hub.states(k / 15).values()
         assert "intermittent" in states and states[-EACH:] == ["ok"] * EACH
         said.append(states)
