@@ -47,6 +47,7 @@ from gestured.simulator.everyday import Day, day, planned
 from gestured.simulator.places import PLACES, Place
 from gestured.simulator.variety import any_sensor
 
+N = TypeVar("N")
 T = TypeVar("T")
 
 IDLE = 20  # frames that are put on each side of a cut recording
@@ -181,8 +182,8 @@ STREAMS: dict[str, Callable[[int, int], list[Sample]]] = {
 }
 
 
-def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
-    """What `make` gives for each number, in order, by at most `jobs` processes; an interruption ends all of them.
+def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: str) -> Iterator[T]:
+    """What `make` gives for each of `todo`, in order, by at most `jobs` processes; an interruption ends all of them.
 
     Raises GesturedError if one of them is killed: its work is lost, and the pool would wait for it for ever.
     """

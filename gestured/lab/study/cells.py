@@ -8,7 +8,6 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +66,8 @@ class Schedule:
         if not todo:
             return
         if self.cluster is None:
-            yield from in_processes(partial(_nth, todo, sets), range(len(todo)), self.jobs, title)
+            cells = [(task, sets[task.data]) for task in todo]  # a process is sent the data of its cell alone
+            yield from in_processes(_cell, cells, self.jobs, title)
         else:
             yield from progress(_there(todo, sets, self.cluster), len(todo), title)
 
@@ -79,8 +79,8 @@ def compute(task: Task, data: Data) -> tuple[Task, Result]:
         return task, run(task, data)
 
 
-def _nth(todo: Sequence[Task], sets: Mapping[str, Data], n: int) -> tuple[Task, Result]:
-    return compute(todo[n], sets[todo[n].data])
+def _cell(cell: tuple[Task, Data]) -> tuple[Task, Result]:
+    return compute(*cell)
 
 
 def _there(todo: Sequence[Task], sets: Mapping[str, Data], cluster: str) -> Iterator[tuple[Task, Result]]:
