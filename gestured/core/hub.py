@@ -272,7 +272,7 @@ class Hub:
         return silent | {name: shown.get(name) or sensor.condition(now)[0] for name, sensor in self._sensors.items()}
 
     def _as_of(self, sensor: Sensor, now: float) -> float:
-        """The time in s for which a sensor's state is known: `now`, or when one in a bank was heard as last shown."""
+        """The time in s at which a sensor's state is read: `now`; in a bank, that of the last frame it was shown."""
         return min(now, sensor.owner.heard) if sensor.name in self._banks.homes else now
 
     def listening(self, now: float) -> list[Gate]:
