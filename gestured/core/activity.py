@@ -4,6 +4,7 @@ Frames are not smoothed over time, since at 15 Hz a tap is one to three frames.
 """
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +104,11 @@ class Activity:
         self.scale = min(max(self.usual / self.typical, 1.0), USUAL_AT_MOST)
 
 
+@cache
 def _blob(size: int) -> Array:
-    """(size, size) banded weights of `BLOB`, normalised so that white noise keeps its size."""
+    """(size, size) banded weights of `BLOB`, normalised so that white noise keeps its size; all sensors share them."""
     side, middle, _ = BLOB
     band = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
-    return np.asarray(band / math.sqrt(sum(b * b for b in BLOB)))
+    weights = np.asarray(band / math.sqrt(sum(b * b for b in BLOB)))
+    weights.setflags(write=False)
+    return weights

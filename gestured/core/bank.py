@@ -33,6 +33,7 @@ from gestured.core.idle import (
     glances,
     seen,
 )
+from gestured.core.mounting import Mounting
 from gestured.core.owner import Source
 from gestured.core.quantiles import median
 from gestured.core.segmenter import IDLE
@@ -44,6 +45,7 @@ from gestured.core.wire import Block
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Kind = tuple[int, int, Mounting, bool, int]  # a grid, its mounting, whether time tags count, and the frames kept
 
 NOBODY: Source = "", 0  # owns no sensor
 FEW = 6  # from so many frames on, taking them together costs less than one by one
@@ -66,8 +68,8 @@ class Banks:
     """The calm sensors of a hub: a bank for each kind of them."""
 
     def __init__(self) -> None:
-        self._banks: dict[tuple[int, ...], Bank] = {}
-        self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: the kind of its bank
+        self._banks: dict[Kind, Bank] = {}
+        self.homes: dict[str, Kind] = {}  # by sensor: the kind of its bank
         self.states: dict[str, str] = {}  # by sensor in a bank: its state, as of when it was shown last
         self._turn = 0
         self.doubted: set[str] = set()  # sensors, in banks or not, whose next frame may come after lost ones

@@ -6,7 +6,6 @@ stays off, so that a classifier can be asked meanwhile.
 """
 
 from collections.abc import Sequence
-from dataclasses import astuple
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +78,7 @@ class FrontEnd:
         # Whether the idle sensor is known without doubt, no taxel is bad, and nobody touches it. Then a bank may
         # take its next frame together with those of other sensors of the same `kind`.
         self.calm = False
-        self.kind = (rows, columns, *astuple(self.mounting))
+        self.kind = rows, columns, self.mounting
         self.pace = Pace()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
         self._lowest = np.zeros(0)  # (N,) counts, the lowest since then

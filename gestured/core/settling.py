@@ -97,11 +97,12 @@ def _learned(stack: Array) -> Learned:
     Noise is told by differences, which slow movement hardly changes, and by means of absolute values, since a single
     outlier must not rule.
     """
-    stack = _without_spikes(stack)
+    jumps, baseline, step = _shown(stack)
+    good = _good(stack, jumps, baseline, step)
+    if not good.all():
+        stack = stack[good]
+        jumps, baseline, step = _shown(stack)
     half = len(stack) // 2
-    baseline = median(stack)
-    jumps = np.abs(np.diff(stack, axis=0))
-    step = quantum(stack, jumps)
     clipped = bool(np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * baseline.size)
     usual = _usual(jumps, clipped=clipped)
     floor = calm = max(usual, step)  # counts, one standard deviation of the usual taxel, or one step if that is more
@@ -111,7 +112,7 @@ def _learned(stack: Array) -> Learned:
     spread = np.abs(stack - baseline).mean(axis=0) * SIGMA_PER_DEVIATION  # each taxel's standard deviation
     shift = np.abs(median(stack[:half]) - median(stack[half:]))
     moved = np.maximum(spread, shift) > RESTLESS * calm
-    constant = np.all(jumps == 0, axis=0)
+    constant = (jumps == 0).all(axis=0)
     if clipped or usual < step or np.count_nonzero(constant) > constant.size // CONSTANT_ONE_IN:
         constant[:] = False  # the taxels of a clipped or coarse sensor stand still when idle, which proves no fault
     pooled = (len(stack) * spread**2 + PRIOR_FRAMES * floor**2) / (len(stack) + PRIOR_FRAMES)
@@ -125,18 +126,24 @@ def _learned(stack: Array) -> Learned:
 def _usual(jumps: Array, *, clipped: bool) -> float:
     """Counts, the standard deviation of the usual taxel by (n, N) absolute changes; 0 if there were none."""
     rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
-    return quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
+    moving = rough[rough > 0]
+    return quantile(moving, CLIPPED_QUANTILE if clipped else 0.5) if moving.size else 0.0
 
 
-def _without_spikes(stack: Array) -> Array:
-    """(n, N) counts without the few frames that are spikes: one spike would rule the noise for minutes."""
-    jumps = np.abs(np.diff(stack, axis=0))
+def _shown(stack: Array) -> tuple[Array, Array, float]:
+    """The (n - 1, N) absolute changes of (n, N) counts, their (N,) medians, and the quantisation step."""
+    jumps = np.abs(stack[1:] - stack[:-1])
+    return jumps, median(stack), quantum(stack, jumps)
+
+
+def _good(stack: Array, jumps: Array, baseline: Array, step: float) -> NDArray[np.bool_]:
+    """(n,) false for the few frames that are spikes: one spike would rule the noise for minutes."""
     leaps = jumps.max(axis=1)
-    quarter = len(leaps) // 4
-    usual = float(np.partition(leaps, quarter)[quarter])  # the lower quartile, since each spike makes two leaps
-    good = np.abs(stack - median(stack)).max(axis=1) <= SPIKE * max(usual, quantum(stack, jumps))
-    spikes = len(stack) - np.count_nonzero(good)
-    return stack if not spikes or spikes > max(1, len(stack) // SPIKES_ONE_IN) else stack[good]
+    leaps.sort()
+    usual = leaps.item(len(leaps) // 4)  # the lower quartile, since each spike makes two leaps
+    good = np.abs(stack - baseline).max(axis=1) <= SPIKE * max(usual, step)
+    few = np.count_nonzero(~good) <= max(1, len(stack) // SPIKES_ONE_IN)
+    return good if few else np.ones_like(good)
 
 
 def quantum(stack: Array, jumps: Array) -> float:
@@ -144,7 +151,7 @@ def quantum(stack: Array, jumps: Array) -> float:
 
     Whole numbers count in ones; otherwise the smallest change that was seen is taken.
     """
-    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < WHOLE:
+    if (stack == np.rint(stack)).all() and np.abs(stack).max() < WHOLE:
         return 1.0
     seen = jumps[jumps > 0]
     top = float(median(np.abs(stack).max(axis=1)))  # the median over frames, since one spike must not rule
