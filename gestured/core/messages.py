@@ -5,12 +5,12 @@ An invalid request is a ProtocolError with the reason `subscription`.
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gesture, Provisional, Status, Touch, Unknown, Where
+from gestured.core.events import Event, Gesture, Place, Provisional, Status, Touch, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # the most characters of what a peer sent that an answer quotes
@@ -109,8 +109,8 @@ def json_line(value: Mapping[str, Any]) -> bytes:
 
 def _plain_value(value: Any) -> Any:
     """The plain value that JSON knows for a mapping of any kind, for `Where`, or for a number of numpy's."""
-    if isinstance(value, Where):
-        return asdict(value)
+    if isinstance(value, Where | Place):
+        return {name: getattr(value, name) for name in value.__slots__}  # `asdict` would copy each value
     return dict(value) if isinstance(value, Mapping) else value.item()
 
 
