@@ -106,11 +106,12 @@ class Cutter:
 
     def cut(self, onset: float, offset: float) -> Segment:
         """The segment of a contact that is over, made after the contact has shown which taxels are stuck."""
-        _, still = self._make(onset, offset)
-        if self._conditioner.taxels.judge(still):
+        made = self._make(onset, offset)
+        if self._conditioner.taxels.judge(made[1]):
             self._conditioner.review()
-        (segment, _), self._made = self._make(onset, offset), None
-        return segment
+            made = self._make(onset, offset)
+        self._made = None
+        return made[0]
 
     def hole(self, onset: float, offset: float, until: float) -> float:
         """The longest time in s in which the finger may have moved unseen, from before the onset to `until` s.
