@@ -85,9 +85,9 @@ class Daemon:
                 self.hello = {}
                 self._counts.connected("daemon", False, f"no daemon answers on {line['path']}; waiting for it")
 
-    def silent_by(self, gate: str) -> list[str]:
-        """The sensors for which that gate is closed."""
-        return [name for name, told in self.listening.items() if gate in told.get("closed", ())]
+    def is_silent_by(self, gate: str) -> bool:
+        """Whether that gate is closed for any sensor."""
+        return any(gate in told.get("closed", ()) for told in self.listening.values())
 
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.

@@ -111,8 +111,9 @@ class Mqtt:
             decided = time.monotonic() - self._daemon.age(line, time.time())
             topic = topic_of(self._host, line["sensor"], line["type"])
             self._waiting.append(Outgoing(decided, topic, self._daemon.payload(line)))
-        if self._gate is not None and self._connected and line["type"] == STATUS:
-            self._gate.repeat(self._daemon.silent_by(self._gate.name), line["time"])
+        gate = self._gate if line["type"] == STATUS and self._connected else None
+        if gate is not None and self._daemon.is_silent_by(gate.name):
+            gate.renew()
         self._changed |= line["type"] in ("hello", "gestures", STATUS, GONE)
         self._send()
 

@@ -56,11 +56,25 @@ class Gatekeeper:
         """Open a gate for one sensor, or for all; a gate that is open stays open."""
         return self._open(gate, sensor)
 
-    async def keep_closed(
-        self, connection: Connection, bridge: BridgeName, gate: GateName, seconds: Seconds, sensor: Sensor = None
+    async def keep_closed(  # noqa: PLR0913 - the keys of a request
+        self,
+        connection: Connection,
+        bridge: BridgeName,
+        gate: GateName,
+        seconds: Seconds,
+        sensor: Sensor = None,
+        *,
+        renew: bool = False,
     ) -> Reply:
-        """Close a bridge's gate until it is allowed; a bridge that does not repeat this within `seconds` is overdue."""
+        """Close a bridge's gate until it is allowed; a bridge that does not renew this within `seconds` is overdue.
+
+        With `renew` it changes no gate, which an operator may have opened or given a time meanwhile.
+        """
         _require_own(gate, bridge)
+        if renew:
+            due = time.monotonic() + seconds
+            self._owed |= {(name, one): due for name, one in self._owed if name == gate and sensor in (None, one)}
+            return self._done([], gate, sensor, bridge)
         named, theirs = self._hub.gates.named, {name for name, _ in self._owed}
         if gate not in named and len(named & theirs) >= BRIDGES_GATES:
             raise Refusal(f"bridges have closed {BRIDGES_GATES} gates already, the most that they can; allow one first")

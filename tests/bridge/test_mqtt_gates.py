@@ -142,34 +142,26 @@ def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, arm, hous
     assert client.line()["closed"] == ["door"]
 
 
-def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daemon, arm: Sensor, monkeypatch) -> None:
-    known(gated, arm)
+def test_a_bridge_gives_signs_of_life_which_change_no_gate(gated: Daemon, arm: Sensor, monkeypatch) -> None:
+    client = known(gated, arm)
     gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
     monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 0.001)
     gate.obey("armrest", OFF)
     with Control(Path(gated.ready["control"])) as operator:
         wait(lambda: operator.ask("status")["overdue"])
         monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 60.0)
-        gate.repeat(["armrest"], time.time())
+        gate.renew()
         assert operator.ask("status")["overdue"] == {}
         operator.ask("allow", gate="mqtt")
-        gate.repeat(["armrest"], time.time())  # too soon
+        operator.ask("inhibit", gate="mqtt", seconds=0.2)
+        monkeypatch.setattr("gestured.bridge.gates.RENEWED_S", 0.0)
+        gate._due = 0.0
+        gate.renew()
+        told = [client.line() for _ in range(4)]
+        assert [bool(line["until"]) for line in told] == [False, False, True, False], "it opened by itself"
+        assert told[-1]["closed"] == []
+        gate.renew()
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
-
-
-def test_what_the_daemon_said_before_closes_no_gate_that_the_bus_has_opened(gated: Daemon, arm: Sensor) -> None:
-    known(gated, arm)
-    gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
-    gate.obey("armrest", OFF)
-    told = time.time()
-    assert gate.obey("armrest", ON) == []
-    for second in (1.0, 0.0):  # the daemon was slow, and had written two while it was asked
-        gate.repeat(["armrest"], told - second)
-    with Control(Path(gated.ready["control"])) as operator:
-        assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
-    gate.repeat(["armrest"], told + 3600.0)  # the clock was set, and it is closed by somebody else in its name
-    with Control(Path(gated.ready["control"])) as operator:
-        assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["mqtt"]
 
 
 @pytest.mark.parametrize(

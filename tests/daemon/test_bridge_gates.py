@@ -64,8 +64,8 @@ def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gon
     assert "a bridge has changed what is closed" in daemon.stderr()
 
 
-async def test_a_sign_of_life_for_one_sensor_looks_at_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bridge repeats what is closed for each sensor by itself, every ten seconds, and there may be a thousand."""
+async def test_who_closes_a_gate_of_one_sensor_looks_at_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bus may close that of a thousand sensors, one by one."""
     hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup(), "seat": Setup()}), Sure())
     monkeypatch.setattr(hub, "readings", None)
     keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]

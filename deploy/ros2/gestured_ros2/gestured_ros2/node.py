@@ -108,8 +108,8 @@ class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
                 self._publish(line)
             elif line["type"] == "status":
                 self._send(self._status, line)
-                if self._gate is not None:
-                    self._gate.repeat(self._daemon.silent_by(self._gate.name), line["time"])
+                if self._gate is not None and self._daemon.is_silent_by(self._gate.name):
+                    self._gate.renew()
             elif line["type"] == GONE:
                 self._say_gone()
             for sensor in self._daemon.states:  # before its first gesture, so that it has subscribers then
