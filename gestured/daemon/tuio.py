@@ -11,7 +11,8 @@ from gestured.daemon.sinks import UdpOut
 
 TUIO = "tuio"  # the scheme of a TUIO destination
 CURSOR = "/tuio/2Dcur"
-IDS = 2**31  # session ids and frame numbers begin anew here, since those of TUIO are int32
+FRAMES = 2**31  # frame numbers begin anew here, since those of TUIO are int32
+SESSIONS = 2**24  # and session ids here, since some programs keep them as float32
 
 
 @dataclass(slots=True)
@@ -40,10 +41,10 @@ class TuioSink(UdpOut):
         super().__init__(destination, metrics)
         self._sources: dict[str, Source] = {}  # by sensor
         self._host = socket.gethostname()
-        self._sessions = 0
-        # The last frame's number. Programs drop frames with numbers below those that they have seen, many whatever the
-        # source is, so all sensors share it, and it begins above those of an earlier start.
-        self._frames = int(1000 * time.time()) % IDS
+        # The next session and the last frame begin above those of an earlier start: a program may have kept a finger
+        # of that, and drops frames with numbers below those that it has seen, many programs whatever the source is.
+        self._sessions = int(10 * time.time()) % SESSIONS
+        self._frames = int(1000 * time.time()) % FRAMES
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Send where a finger is, or that it has left; with the status, which fingers are down."""
@@ -61,7 +62,7 @@ class TuioSink(UdpOut):
                 return
             if key not in cursors:  # came down just now, or before this destination was opened
                 cursors[key] = Cursor(self._sessions, event.t)
-                self._sessions = (self._sessions + 1) % IDS
+                self._sessions = (self._sessions + 1) % SESSIONS
             self._bundle(event.sensor, cursors[key], event)
 
     def take_over(self, before: UdpOut) -> None:
@@ -81,7 +82,7 @@ class TuioSink(UdpOut):
         """Send a frame of a sensor: the fingers that are down, and perhaps how one moved. TUIO's y grows downward."""
         source = self._sources[sensor]
         alive = [one.session for one in source.cursors.values()]
-        self._frames = (self._frames + 1) % IDS
+        self._frames = (self._frames + 1) % FRAMES
         if source.idle and not alive:
             self.send(source.idle + self._frames.to_bytes(4, "big"))
             return

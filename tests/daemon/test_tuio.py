@@ -51,7 +51,8 @@ def test_a_cursor_follows_the_finger_and_is_removed_with_it(start: Callable[...,
     screen = Screen(udp)
     Sensor(daemon, "arm").begin().perform("up", "right")
     screen.read(lambda: [what for what, *_ in screen.seen].count("remove") == 2)
-    up, right = ([one for one in screen.seen if one[1] == session] for session in (0, 1))
+    sessions = dict.fromkeys(session for _, session, *_ in screen.seen)
+    up, right = ([one for one in screen.seen if one[1] == session] for session in sessions)
     for way in (up, right):
         assert [what for what, *_ in way] == ["add", *["update"] * (len(way) - 2), "remove"] and len(way) >= 7
     assert [y for *_, y in up] == sorted((y for *_, y in up), reverse=True)  # downward is more
@@ -71,43 +72,49 @@ def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.soc
     sink.publish(event, 0.0)
     source, *rest = sent()
     assert source == ["source", f"gestured/arm@{socket.gethostname()}"]
-    first = rest[2][1]
-    assert rest == [["alive", 0], ["set", 0, 0.25, 0.25, 0.0, 0.0, 0.0], ["fseq", first]]
+    first, one = rest[2][1], rest[0][1]
+    assert rest == [["alive", one], ["set", one, 0.25, 0.25, 0.0, 0.0, 0.0], ["fseq", first]]
     sink.publish(Touch("arm", 7, 1, "move", 10.0, 0.5, 0.5, 0.1, 0.0, 100.0, 4), 0.0)  # of which no `down` was seen
-    assert sent()[1:] == [["alive", 0, 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 1]]
+    _, alive, place, number = sent()
+    two = alive[-1]
+    assert alive == ["alive", one, two] and one != two
+    assert [place, number] == [["set", two, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 1]]
     sink.publish(Touch("arm", 7, 0, "move", 10.5, 0.5, 0.875, 0.25, 0.125, 100.0, 4), 0.0)
     speed = pytest.approx((0.5**2 + 0.25**2) ** 0.5 / 0.5, rel=1e-6)
-    assert sent()[2] == ["set", 0, 0.5, 0.125, 0.5, -0.25, speed]
+    assert sent()[2] == ["set", one, 0.5, 0.125, 0.5, -0.25, speed]
     sink.publish(Status("ok", {"arm": "ok", "leg": "ok"}, "m", 1.0), 0.0)
-    assert [sent()[1:] for _ in "12"] == [[["alive", 0, 1], ["fseq", first + 3]], [["alive"], ["fseq", first + 4]]]
+    assert [sent()[1:] for _ in "12"] == [[["alive", one, two], ["fseq", first + 3]], [["alive"], ["fseq", first + 4]]]
     sink.publish(Touch("arm", 7, 0, "up", 11.0, 0.5, 0.875, 0.0, 0.0, 100.0, 4), 0.0)
-    assert sent()[1:] == [["alive", 1], ["fseq", first + 5]]
+    assert sent()[1:] == [["alive", two], ["fseq", first + 5]]
     sink.publish(Status("ok", {"leg": "ok"}, "m", 1.0), 0.0)
     assert sent() == [["source", f"gestured/leg@{socket.gethostname()}"], ["alive"], ["fseq", first + 6]]
-    assert sent()[1:] == [["alive", 1], ["fseq", first + 7]]
+    assert sent()[1:] == [["alive", two], ["fseq", first + 7]]
     again = TuioSink(Address(*udp.getsockname()), Metrics())  # as at a reload: the finger stays who it was
     again.take_over(sink)
     sink.close()
     again.publish(Touch("arm", 7, 1, "move", 12.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
-    assert sent()[1:] == [["alive", 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 8]]
+    assert sent()[1:] == [["alive", two], ["set", two, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", first + 8]]
     again.publish(Touch("arm", 8, 0, "down", 12.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
-    assert sent()[1][:3] == ["alive", 1, 2]
+    assert sent()[1][1] == two
     again.close()  # which tells programs that draw that no finger is left
     assert [sent()[1:] for _ in "12"] == [[["alive"], ["fseq", first + n]] for n in (10, 11)]
 
 
-def test_frames_go_on_where_those_of_an_earlier_start_ended(
+def test_frames_and_sessions_go_on_where_those_of_an_earlier_start_ended(
     udp: socket.socket, sent: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Programs drop frames whose numbers are a little lower than those that they have seen."""
-    numbers = []
-    for t in (1.7e9, 1.7e9 + 1):
+    """Programs drop frames of lower numbers than they have seen, and take a finger for the old one of its session."""
+    numbers, sessions = [], []
+    for t in (1.7e9, 1.7e9 + 10):
         monkeypatch.setattr("gestured.daemon.tuio.time.time", lambda t=t: t)
         sink = TuioSink(Address(*udp.getsockname()), Metrics())
-        for _ in range(60):
-            sink.publish(Status("ok", {"arm": "ok"}, "m", 1.0), 0.0)
-            numbers.append(sent()[-1][1])
-    assert numbers == sorted(set(numbers)) and 0 < numbers[0] < numbers[-1] < 2**31
+        for touch in range(60):
+            sink.publish(Touch("arm", touch, 0, "down", 10.0, 0.5, 0.5, 0.0, 0.0, 100.0, 4), 0.0)
+            *_, (_, session, *_), (_, number) = sent()
+            numbers.append(number)
+            sessions.append(session)
+    for told, most in ((numbers, 2**31), (sessions, 2**24)):
+        assert told == sorted(set(told)) and 0 < told[0] < told[-1] < most
 
 
 def test_it_needs_touch_events(model: Path) -> None:
