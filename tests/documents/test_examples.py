@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -235,14 +236,18 @@ def test_a_slider_follows_the_next_finger_if_an_up_was_lost(place: Place, tmp_pa
 
 
 def test_what_was_missed_between_two_connections_is_counted(place: Place, tmp_path: Path):
-    """A client that does not read is cut off; then the hello names gestures of which it has not heard."""
+    """A client that does not read is cut off; then the hello names gestures of which it has not heard.
+
+    A gesture that comes a minute late is neither missed nor done.
+    """
+    fresh, late = (GESTURE | {"decided": time.time() + s} for s in (60.0, -60.0))  # however slow this machine is
     said = heard(
         place,
         tmp_path,
         "across its restarts",
-        (HELLO | {"sensors": {"armrest": 4}}, GESTURE | {"sequence": 5}),
-        (HELLO | {"sensors": {"armrest": 8}}, GESTURE | {"sequence": 9}),
-        (HELLO | {"instance": "another", "sensors": {"armrest": 2}}, GESTURE | {"sequence": 3}),
+        (HELLO | {"sensors": {"armrest": 4}}, fresh | {"sequence": 5}, late | {"sequence": 6}),
+        (HELLO | {"sensors": {"armrest": 9}}, fresh | {"sequence": 10}),
+        (HELLO | {"instance": "another", "sensors": {"armrest": 2}}, fresh | {"sequence": 3}),
     )
     assert [line.split(" ", 3)[3] for line in said] == ["0 missed\n", "3 missed\n", "0 missed\n"]
 
