@@ -13,6 +13,7 @@ NOTICE_S = 0.25  # an absent daemon is noticed after so long
 GONE = "gone"  # the type of a line that the bridge makes: the daemon is not there; connecting goes on
 MOST_SENSORS = 4096  # the most names that are remembered, since any sender of frames can invent some
 DRIFT = 0.1  # s in a second by which a sensor's clock may drift; real ones drift a ten-thousandth of it
+HELD_S = 1.5  # a daemon that has not said its status for so long was held up, since it does so each second
 OLD_S = 1.0  # an older event is of no use: a window would open a second late
 
 Line = Mapping[str, Any]
@@ -60,6 +61,7 @@ class Daemon:
         self.gestures: list[str] | None = None  # None until the daemon has told them
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
+        self._told = 0.0  # s since 1970, when the daemon last said its status
         self._lags: dict[str, tuple[float, float]] = {}  # by sensor: smallest lag in s, and when it was updated
 
     def take(self, line: Line) -> None:
@@ -79,6 +81,7 @@ class Daemon:
                 if line["sensor"] in sequences or len(sequences) < MOST_SENSORS:
                     self.hello = {**self.hello, "sensors": {**sequences, line["sensor"]: line["sequence"]}}
             case "status":
+                self._told = line["time"]
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])
             case "gone":
@@ -92,17 +95,21 @@ class Daemon:
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.
 
-        A sensor's own clock may be wrong by any time, so the age is the lag beyond the smallest lag so far. The event
-        of `gesturectl emit` has the daemon's clock instead, which says nothing about the sensor's.
+        A sensor's own clock may be wrong by any time, so the age is the lag beyond the smallest lag so far. But if the
+        daemon was held up, the event may have waited for as long. The event of `gesturectl emit` has the daemon's
+        clock, which says nothing about the sensor's.
         """
         if event.get("decided") is None or event.get("test"):
             return 0.0
-        lag = float(now - event["decided"])
+        lag, silence = float(now - event["decided"]), now - self._told
+        held = silence if silence > HELD_S else 0.0
+        least = lag - min(max(lag, 0.0), held)
         if event["sensor"] not in self._lags and len(self._lags) >= MOST_SENSORS:
             self._lags.clear()
-        smallest, found = self._lags.get(event["sensor"], (lag, now))
-        smallest = min(lag, smallest + DRIFT * max(now - found, 0.0))
-        self._lags[event["sensor"]] = smallest, now
+        smallest, found = self._lags.get(event["sensor"], (least, now))
+        smallest = min(least, smallest + DRIFT * max(now - found, 0.0))
+        if not held:
+            self._lags[event["sensor"]] = smallest, now
         return lag - smallest
 
     def payload(self, event: Line) -> bytes:

@@ -530,9 +530,27 @@ def test_a_daemon_that_hangs_is_gone_until_it_goes_on(daemon: Daemon, monkeypatc
 
 @pytest.mark.parametrize("ahead", [-30.0, 30.0])
 def test_a_test_says_nothing_of_the_sensors_clock_and_is_never_old(ahead: float) -> None:
-    daemon = known.Daemon(None, None, Counts("mqtt"))
+    daemon, ages = known.Daemon(None, None, Counts("mqtt")), []
     events = [gesture(1, decided=100 + ahead), gesture(2, decided=101, test=True), gesture(3, decided=102 + ahead)]
-    assert [daemon.age(event, now) for now, event in zip((100, 101, 102), events, strict=True)] == [0.0, 0.0, 0.0]
+    for now, event in zip((100, 101, 102), events, strict=True):
+        daemon.take(STATUS | {"time": now})
+        ages.append(daemon.age(event, now))
+    assert ages == [0.0, 0.0, 0.0]
+
+
+def test_what_has_waited_while_the_daemon_was_held_up_is_old() -> None:
+    """It says its status each second if it can; after a silence an event may have waited for as long."""
+    daemon, ages = known.Daemon(None, None, Counts("mqtt")), []
+    for status, sensor, decided, now in (
+        (100.0, "armrest", 100.6, 104.9),  # the first of its sensor
+        (105.0, "armrest", 105.5, 105.5),
+        (900.0, "armrest", 900.2, 903.0),  # after many minutes, in which its clock may have drifted
+        (904.0, "door", 504.5, 904.5),  # its clock is wrong
+        (905.0, "door", 505.5, 905.5),
+    ):
+        daemon.take(STATUS | {"time": status})
+        ages.append(daemon.age(gesture(1, decided=decided) | {"sensor": sensor}, now))
+    assert ages == pytest.approx([4.3, 0.0, 2.8, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
