@@ -9,6 +9,7 @@ import errno
 import os
 import select
 import stat
+import termios
 import time
 from typing import Any
 
@@ -112,15 +113,16 @@ class Serial:
             return serial.Serial(self._device, self._baud, timeout=0, write_timeout=ANSWER_S, exclusive=True)
         except ValueError:
             raise BridgeError(f"--baud {self._baud}: this device does not take it") from None
-        except OSError as error:  # or SerialException, a subclass
-            code = error.errno
+        except (OSError, termios.error) as error:  # or SerialException, an OSError, perhaps because of a termios.error
+            cause = error.__context__ or error
+            code = cause.errno if isinstance(cause, OSError) else cause.args[0]
             said = os.strerror(code) if code else str(error)
             if code == errno.EACCES and not self._opened:  # a new device belongs to root for a moment
                 remedy = 'sudo adduser "$USER" dialout, and log in again'
                 raise BridgeError(f"{self._device}: {said}: it is for members of its group ({remedy})") from None
             if code == errno.EAGAIN:
                 raise BridgeError(f"{self._device}: another program has it open: end that one first") from None
-            if code is None and "onfigure" in said:
+            if code == errno.ENOTTY:
                 raise BridgeError(none) from None
             self._counts.connected("device", False, f"{self._device} is not there: {said}; waiting for it")
             return None

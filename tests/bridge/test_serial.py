@@ -10,6 +10,7 @@ import stat
 import struct
 import subprocess
 import sys
+import termios
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -263,6 +264,22 @@ def test_a_device_that_takes_no_request_is_given_time_before_it_is_opened_again(
     bridge.work()
     assert "it takes no request" in capfd.readouterr().err
     assert slept == [AGAIN_S] * 2  # once between two attempts
+
+
+@pytest.mark.parametrize("step", ["tcgetattr", "tcsetattr", "tcflush"])
+def test_a_device_that_is_unplugged_while_it_is_opened_is_waited_for(line, monkeypatch, capfd, step: str) -> None:
+    """As with a loose plug; pyserial says it in three ways."""
+    real = getattr(termios, step)
+
+    def unplugged(*arguments: Any) -> Any:
+        os.close(line.end)
+        line.end = os.open(os.devnull, os.O_RDWR)
+        return real(*arguments)
+
+    monkeypatch.setattr(termios, step, unplugged)
+    told = {"device": str(line.link), "baud": None, "grid": None, "to": Address("127.0.0.1", 9), "metrics": None}
+    assert Serial(argparse.Namespace(protocol="csv", sensor="skin", **told), Counts("serial"))._open() is None
+    assert "ttyUSB0 is not there: Input/output error; waiting for it" in capfd.readouterr().err
 
 
 def test_bytes_of_another_protocol_are_recognised(bridge, line, udp):
