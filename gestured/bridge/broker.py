@@ -39,8 +39,9 @@ class Broker:
         except argparse.ArgumentTypeError as error:
             raise BridgeError(f"--broker {error}") from None
         self._host, self._prefix = host, args.discovery
-        if not self._prefix or set("#+\0") & set(self._prefix) or not self._prefix.isprintable():
-            raise BridgeError(f"--discovery {quoted(self._prefix)}: expected the beginning of a topic, without # and +")
+        if not self._prefix.rpartition("/")[2] or set("#+") & set(self._prefix) or not self._prefix.isprintable():
+            expected = "expected the beginning of a topic, without #, +, and a / at its end"
+            raise BridgeError(f"--discovery {quoted(self._prefix)}: {expected}")
         self._user, self._password = _variable("MQTT_USER"), _variable("MQTT_PASSWORD")
         if args.gates is not None and self._user is None and args.cert is None:
             raise BridgeError(f"--gates: a broker that knows nobody may close no gate: {_LOGIN}, or name a --cert")

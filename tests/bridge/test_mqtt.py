@@ -630,6 +630,7 @@ def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, f
         (["--broker", "localhost", "--types", "gestures"], "--types"),
         (["--broker", "localhost", "--discovery", "home/#"], '--discovery "home/#": expected the beginning of a topic'),
         (["--broker", "localhost", "--discovery", "+"], '--discovery "+": expected the beginning of a topic'),
+        (["--broker", "localhost", "--discovery", "ha/"], '--discovery "ha/": expected the beginning of a topic'),
         (["--broker", "localhost", "--discovery", ""], '--discovery "": expected the beginning of a topic'),
     ],
 )
