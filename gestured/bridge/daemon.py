@@ -1,6 +1,7 @@
 """The daemon that a bridge mirrors: whether it is there, its gestures and sensors, and the age of its events."""
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ GONE = "gone"  # the type of a line that the bridge makes: the daemon is not the
 MOST_SENSORS = 4096  # the most names that are remembered, since any sender of frames can invent some
 DRIFT = 0.1  # s in a second by which a sensor's clock may drift; real ones drift a ten-thousandth of it
 HELD_S = 1.5  # a daemon that has not said its status for so long was held up, since it does so each second
+WORKS_OFF_S = 5.0  # and takes so long at most to work off what has waited
 OLD_S = 1.0  # an older event is of no use: a window would open a second late
 
 Line = Mapping[str, Any]
@@ -61,7 +63,8 @@ class Daemon:
         self.gestures: list[str] | None = None  # None until the daemon has told them
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
-        self._told = 0.0  # s since 1970, when the daemon last said its status
+        self._told = math.inf  # s since 1970, when the daemon last said its status
+        self._held, self._over = 0.0, 0.0  # s, how long it was held up before, and s since 1970, until when that counts
         self._lags: dict[str, tuple[float, float]] = {}  # by sensor: smallest lag in s, and when it was updated
 
     def take(self, line: Line) -> None:
@@ -81,7 +84,9 @@ class Daemon:
                 if line["sensor"] in sequences or len(sequences) < MOST_SENSORS:
                     self.hello = {**self.hello, "sensors": {**sequences, line["sensor"]: line["sequence"]}}
             case "status":
-                self._told = line["time"]
+                held, self._told = line["time"] - self._told, line["time"]
+                if held > HELD_S:
+                    self._held, self._over = held, self._told + WORKS_OFF_S
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])
             case "gone":
@@ -101,8 +106,9 @@ class Daemon:
         """
         if event.get("decided") is None or event.get("test"):
             return 0.0
-        lag, silence = float(now - event["decided"]), now - self._told
-        held = silence if silence > HELD_S else 0.0
+        lag, held = float(now - event["decided"]), now - self._told
+        if held <= HELD_S:
+            held = self._held if now < self._over else 0.0
         least = lag - min(max(lag, 0.0), held)
         if event["sensor"] not in self._lags and len(self._lags) >= MOST_SENSORS:
             self._lags.clear()

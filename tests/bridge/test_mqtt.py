@@ -530,27 +530,32 @@ def test_a_daemon_that_hangs_is_gone_until_it_goes_on(daemon: Daemon, monkeypatc
 
 @pytest.mark.parametrize("ahead", [-30.0, 30.0])
 def test_a_test_says_nothing_of_the_sensors_clock_and_is_never_old(ahead: float) -> None:
-    daemon, ages = known.Daemon(None, None, Counts("mqtt")), []
+    daemon = known.Daemon(None, None, Counts("mqtt"))
     events = [gesture(1, decided=100 + ahead), gesture(2, decided=101, test=True), gesture(3, decided=102 + ahead)]
-    for now, event in zip((100, 101, 102), events, strict=True):
-        daemon.take(STATUS | {"time": now})
-        ages.append(daemon.age(event, now))
-    assert ages == [0.0, 0.0, 0.0]
+    assert [daemon.age(event, now) for now, event in zip((100, 101, 102), events, strict=True)] == [0.0, 0.0, 0.0]
 
 
 def test_what_has_waited_while_the_daemon_was_held_up_is_old() -> None:
     """It says its status each second if it can; after a silence an event may have waited for as long."""
-    daemon, ages = known.Daemon(None, None, Counts("mqtt")), []
-    for status, sensor, decided, now in (
-        (100.0, "armrest", 100.6, 104.9),  # the first of its sensor
-        (105.0, "armrest", 105.5, 105.5),
-        (900.0, "armrest", 900.2, 903.0),  # after many minutes, in which its clock may have drifted
-        (904.0, "door", 504.5, 904.5),  # its clock is wrong
-        (905.0, "door", 505.5, 905.5),
-    ):
-        daemon.take(STATUS | {"time": status})
-        ages.append(daemon.age(gesture(1, decided=decided) | {"sensor": sensor}, now))
-    assert ages == pytest.approx([4.3, 0.0, 2.8, 0.0, 0.0])
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+
+    def age(decided: float, now: float, sensor: str = "armrest") -> float:
+        return round(daemon.age(gesture(1, decided=decided) | {"sensor": sensor}, now), 3)
+
+    def goes_on(begin: int, end: int) -> None:
+        for second in range(begin, end):
+            daemon.take(STATUS | {"time": float(second)})
+
+    goes_on(90, 101)
+    assert age(100.6, 104.9) == 4.3  # the first of its sensor
+    daemon.take(STATUS | {"time": 104.9})
+    assert age(101.5, 105.0) == 3.5  # it waited for another turn of the daemon
+    goes_on(105, 901)
+    assert age(900.2, 900.2) == 0.0
+    goes_on(901, 1801)
+    assert age(1800.2, 1803.0) == 2.8  # after many minutes, in which the sensor's clock may have drifted
+    goes_on(1803, 1901)
+    assert age(400.0, 1900.1, "door") == 0.0  # its clock is wrong
 
 
 @pytest.fixture(scope="module")
