@@ -62,9 +62,9 @@ class Mqtt:
         self._since = 0.0  # monotonic s, when the broker accepted the connection
         self._waiting: deque[Outgoing] = deque()  # events for the broker, in order
         self._sent: dict[int, Outgoing] = {}  # by message number: events that the broker has not acknowledged
-        self._changed = False  # whether the broker may have to retain something else now
+        self._changed = False  # whether a command has changed what the broker should retain
         self._changes: Iterator[tuple[str, str]] = iter(())  # retained messages to be published
-        self._change = 0  # number of the retained message that the broker has not acknowledged, or 0
+        self._changing: set[int] = set()  # numbers of retained messages that the broker has not acknowledged
         self._farewell = 0  # number of the last message, "offline"
         self._most = 0  # messages that may be in flight, without the last one
 
@@ -114,7 +114,8 @@ class Mqtt:
         gate = self._gate if line["type"] == STATUS and self._connected else None
         if gate is not None and self._daemon.is_silent_by(gate.name):
             gate.renew()
-        self._changed |= line["type"] in ("hello", "gestures", STATUS, GONE)
+        if line["type"] in ("hello", "gestures", STATUS, GONE):  # this goes before what the broker is still to retain
+            self._changes = self._retained.changes()
         self._send()
 
     def _call(self) -> None:
@@ -149,7 +150,8 @@ class Mqtt:
         if self._gate is not None:
             self._broker.hear(client, self._commanded)
         self._retained.forget()
-        self._changed, self._changes, self._change = True, iter(()), 0
+        self._changes = self._retained.changes()
+        self._changing.clear()
         self._waiting.extendleft(reversed(self._sent.values()))  # what was not acknowledged comes first
         self._sent.clear()
         self._send()
@@ -177,10 +179,9 @@ class Mqtt:
             raise self._broker.unwritable(code)
         if number == self._farewell:
             client.disconnect()
-        elif number == self._change:
-            self._change = 0
         elif self._sent.pop(number, None) is not None:
             self._counts.add("events", "sent")
+        self._changing.discard(number)
         self._send()
 
     def _subscribed(self, client: Any, codes: Any) -> None:
@@ -218,22 +219,23 @@ class Mqtt:
         """Publish what waits, as far as the broker has acknowledged earlier messages."""
         if not self._connected or self._stopping:
             return
-        while not self._change and len(self._sent) < self._most:
+        most = max(self._most // 2, 1)  # so that no event waits for all of them
+        while len(self._changing) < most and len(self._sent) + len(self._changing) < self._most:
             change = next(self._changes, None)
             if change is not None:
-                self._change = self._publish(*change, retain=True)
-            elif self._changed:
+                self._changing.add(self._publish(*change, retain=True))
+            elif self._changed and not self._changing:  # many changes at a time are looked for once
                 self._changed, self._changes = False, self._retained.changes()
             else:
                 break
-        while self._waiting and len(self._sent) + bool(self._change) < self._most:
+        while self._waiting and len(self._sent) + len(self._changing) < self._most:
             event = self._waiting.popleft()
             if time.monotonic() - event.decided > OLD_S:
                 self._counts.add("events", "old")
                 continue
             fresh = properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
             self._sent[self._publish(event.topic, event.payload, properties=fresh)] = event
-        if not self._change and self._daemon.hello:
+        if not self._changing and self._daemon.hello:
             self._counts.ready(broker=str(self._broker.address), host=self._host)
 
     def _publish(self, topic: str, payload: str | bytes, **options: Any) -> int:

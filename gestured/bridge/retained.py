@@ -45,16 +45,16 @@ class Retained:
     def changes(self) -> Iterator[tuple[str, str]]:
         """(topic, payload) of each message to publish; an empty payload makes the broker forget a topic.
 
-        A pair counts as retained by the broker as soon as the generator is asked for the next one.
+        Each counts as retained by the broker at once, so the generator may be replaced by a new one at any time.
         """
         wanted = self._wanted()
         for topic, payload in wanted.items():
             if self._kept.get(topic) != payload:
-                yield topic, payload
                 self._kept[topic] = payload
+                yield topic, payload
         for topic in self._kept.keys() - wanted.keys():  # of forgotten gestures and sensors
-            yield topic, ""
             del self._kept[topic]
+            yield topic, ""
 
     def _wanted(self) -> dict[str, str]:
         """By topic: the payload that the broker should retain now."""

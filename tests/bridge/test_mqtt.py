@@ -420,6 +420,29 @@ def test_a_broker_gets_no_more_messages_at_a_time_than_it_asks_for(bridge, fake)
                 connection.sendall(b"\x40\x02" + waiting.pop(0))  # PUBACK
 
 
+def test_a_broker_far_away_hears_first_that_the_daemon_is_gone(bridge, fake):
+    """However much it is still to retain; a message a round trip takes minutes for some dozen sensors."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        to = f"127.0.0.1:{server.getsockname()[1]}"
+        process = bridge("mqtt", "--broker", to, "--socket", fake.path, "--host", "car")
+        fake.accept(HELLO | {"sensors": {f"arm{n}": 0 for n in range(30)}})
+        with server.accept()[0] as connection:
+            connection.settimeout(DEADLINE_S)
+            assert connection.recv(65536).startswith(b"\x10")  # CONNECT
+            process.until("daemon is there")
+            connection.sendall(b"\x20\x03\x00\x00\x00")  # CONNACK
+            told = list[str]()
+            while told.count("gestured/car/availability") < 2:
+                numbers, topics = zip(*published(connection.recv(65536)), strict=True)
+                if not told:
+                    fake.close()
+                    process.until("no daemon answers")
+                told += topics
+                connection.sendall(b"".join(b"\x40\x02" + number for number in numbers))  # PUBACK
+    assert len(told) <= 20
+
+
 def test_a_broker_that_sends_what_cannot_be_read_is_called_again(bridge, fake):
     """Whatever the library's thread dies of: else the bridge would believe for ever that the broker is there."""
     with socket.create_server(("127.0.0.1", 0)) as server:
