@@ -152,8 +152,10 @@ def test_a_browser_whose_clock_stood_still_is_followed_again() -> None:
 
 
 @contextmanager
-def served(to: Address | None = None, **more: float) -> Iterator[tuple[PadServer, Page]]:
-    pad = Pad(to or free_address(), "pad", (9, 9), 15.0)
+def served(
+    to: Address | None = None, grid: tuple[int, int] = (9, 9), **more: float
+) -> Iterator[tuple[PadServer, Page]]:
+    pad = Pad(to or free_address(), "pad", grid, 15.0)
     with PadServer(Address("127.0.0.1", 0), pad, "gesturectl pad", **more).serve() as server:
         yield server, Page(server.page)
 
@@ -263,6 +265,15 @@ def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, brow
             browser.run("fetch = fetching")
             browser.until(f"at('state').textContent === {said!r} && !at('state').classList.contains('gone')")
             assert not server.pad.contacts.down
+
+
+@pytest.mark.parametrize("grid", [(9, 9), (27, 15)])
+def test_all_of_a_pad_is_in_the_window(grid: tuple[int, int], browser: Browser) -> None:
+    browser.size(1280, 600)
+    with served(grid=grid) as (_, page):
+        browser.call("Page.navigate", url=page.whole)
+        browser.until("typeof state === 'object' && state.drawn > 0")
+        browser.until("pad.getBoundingClientRect().bottom <= innerHeight")
 
 
 def wrong(stream: Stream, words: str) -> None:

@@ -114,6 +114,7 @@ function draw() {
 }
 
 function fingers(ratio) {
+  pad.style.setProperty("--ratio", ratio);
   const [g, width, height] = fit(pad, ratio), now = performance.now(), last = new Map();
   while (trail.length && trail[0][0] < now - TRAIL_MS) trail.shift();
   g.strokeStyle = g.fillStyle = getComputedStyle(pad).getPropertyValue("--mark");
