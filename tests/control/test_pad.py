@@ -27,6 +27,7 @@ from gestured.simulator import GESTURES, SimulatedSensor
 from gestured.simulator.live import LiveTextile
 from tests.control.browser import Browser
 from tests.control.pages import Page, Stream
+from tests.daemon.harness import Sensor
 from tests.sockets import FakeDaemon, free_address
 
 Way = Callable[[float], tuple[float, float]]  # share of the time -> x, y, from the bottom-left corner
@@ -282,7 +283,7 @@ def wrong(stream: Stream, words: str) -> None:
         pass
 
 
-def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(
+def test_a_daemon_that_hangs_hears_nothing_or_goes_is_said_and_heard_again(
     serve, udp: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gestured.client.pad.server.SILENT_S", 1.5)  # it tells its status each second
@@ -295,6 +296,8 @@ def test_a_daemon_that_hangs_or_goes_is_said_and_heard_again(
             wrong(stream, "hangs")
         finally:
             daemon.signal(signal.SIGCONT)
+        wrong(stream, "takes no frames of pad")  # they went elsewhere, or are of another grid
+        Sensor(daemon, "pad").begin()
         wrong(stream, "")
         daemon.stop()
         wrong(stream, "no daemon on")

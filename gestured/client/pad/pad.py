@@ -77,9 +77,12 @@ class Pad:
                 self._unnamed = f"No names: {error}"
                 return
             else:
-                self._unnamed = ""
                 if event["type"] != "status":
                     self._tell("event", event)
+                elif event["sensors"].get(self.name, "no_data") == "no_data":
+                    self._unnamed = f"No names: the daemon takes no frames of {self.name}; gesturectl doctor says why"
+                else:
+                    self._unnamed = ""
 
     def _frames(self) -> Iterator[tuple[int, Frame]]:
         """Each frame at its time, with its counter; frames for which the machine was too slow are left out."""
