@@ -323,6 +323,36 @@ def test_frames_of_another_grid_or_of_the_future_are_not_of_the_same_picture(
     assert browser.complaints() == []
 
 
+def test_an_idle_matrix_is_seen_and_the_legend_is_of_what_is_drawn(view: Page, browser: Browser) -> None:
+    browser.colours("light")
+    browser.call("Page.navigate", url=view.whole)
+    browser.until("typeof frame === 'function' && state.stream !== null")
+    shown = FRAME | {"values": [0] * 81, "raw": [300] * 81, "raw_grid": [9, 9]}
+    legend = "document.getElementById('legend').textContent"
+    browser.run(f"state.stream.abort(); state.frames = []; frame({json.dumps(shown)})")
+    browser.until(f"{legend} === '020 counts'")
+    drawn = "[...at('matrix').getContext('2d').getImageData(0, 9, at('matrix').width, 1).data]"
+    lines = f"{drawn}.filter((_, n, all) => n % 4 === 0 && all[n + 3] === 255 && all[n] < 235)"
+    assert len(browser.run(lines)) >= 9  # darker than the taxels, which are as light as the page
+    browser.run("at('raw').checked = true; plan()")
+    browser.until(f"{legend} === '300320 counts'")
+
+
+def test_of_many_sensors_the_table_is_scrolled_and_the_chosen_one_is_shown_after_a_reload(
+    view: Page, real: Daemon, browser: Browser, arm: str
+) -> None:
+    Sensor(real, f"{arm}-first").begin()
+    follow(view, browser, arm, real)
+    more = "told => sensors({ ...told, sensors: { ...told.sensors, ...[...Array(40)].map(() => told.sensors[arm]) } })"
+    browser.run(f"arm = {arm!r}; kinds.sensors = {more}")
+    browser.until("document.querySelectorAll('#sensors tbody tr').length > 40")
+    assert browser.run("document.querySelector('.scroll').clientHeight") < 400
+    browser.call("Page.reload")
+    browser.until(f"typeof state === 'object' && state.sensor === {arm!r} && state.drawn > 0")
+    assert browser.run("document.getElementById('sensor').value") == arm
+    assert browser.complaints() == []
+
+
 def test_a_picture_is_frozen_for_as_long_as_one_pauses(view: Page, browser: Browser) -> None:
     """However many frames come meanwhile; they are kept for a while before and after it, in a bounded number."""
     browser.call("Page.navigate", url=view.whole)

@@ -121,10 +121,13 @@ function colour(share) {
   return stops[i].map((low, c) => Math.round(low + (stops[i + 1][c] - low) * (place - i)));
 }
 
-function taxels(g, values, columns, side, left, least, full) {
+function taxels(g, values, columns, side, left, least, full) { // with lines between them, since an idle one has the page's colour
+  const line = Math.min(1, side / 10);
+  g.fillStyle = getComputedStyle(document.body).getPropertyValue("--line");
+  g.fillRect(left, 0, side * columns, side * values.length / columns);
   values.forEach((value, n) => {
     g.fillStyle = `rgb(${colour((value - least) / full).join(" ")})`;
-    g.fillRect(left + side * (n % columns), side * Math.floor(n / columns), side - 1, side - 1);
+    g.fillRect(left + side * (n % columns), side * Math.floor(n / columns), side - line, side - line);
   });
 }
 

@@ -19,6 +19,7 @@ const kinds = { sensors, frame, event, touch: told => state.sliders.forEach(foll
 function open(sensor) {
   if (state.stream) state.stream.abort();
   state.frames = []; state.full = 0; state.sensor = sensor; state.lies = false;
+  sessionStorage.setItem("sensor", sensor); // for when the page is loaded again
   pause(false);
   rest();
   forget();
@@ -172,7 +173,6 @@ function draw() {
   if (!now) return;
   at("phase").textContent = PHASES[now.phase] ?? now.phase;
   const full = Number(at("scale").value) || state.full || 100;
-  at("full").textContent = `${full} counts`;
   matrix(now, i, full);
   chart(i);
   if (state.paused) at("when").value = now.time - state.time;
@@ -190,6 +190,8 @@ function matrix(now, i, full) {
   // Counts as they were sent have a scale of their own: from the least of this frame.
   const least = sent ? Math.min(...values) : 0, bad = new Set(sent ? [] : now.bad);
   let best = 0;
+  write("least", String(Math.floor(least)));
+  write("full", `${Math.ceil(least + full)} counts`);
   taxels(g, values, columns, side, left, least, full);
   values.forEach((value, n) => {
     if (value > values[best]) best = n;
@@ -327,4 +329,4 @@ addEventListener("keydown", e => {
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (wanted) { e.preventDefault(); wanted(); }
 });
-enter().then(() => open(""), error => daemon(error.message, true));
+enter().then(() => open(door.token ? "" : sessionStorage.getItem("sensor") ?? ""), error => daemon(error.message, true));
