@@ -336,6 +336,10 @@ def test_an_idle_matrix_is_seen_and_the_legend_is_of_what_is_drawn(view: Page, b
     assert len(browser.run(lines)) >= 9  # darker than the taxels, which are as light as the page
     browser.run("at('raw').checked = true; plan()")
     browser.until(f"{legend} === '300320 counts'")
+    fractions = FRAME | {"values": [0.3127, *[0.0] * 80], "noise": 0.003, "centroid": [0, 0]}
+    browser.run(f"at('raw').checked = false; state.frames = []; frame({json.dumps(fractions)})")
+    browser.until(f"{legend} === '00.5 counts'")
+    assert "strongest 0.31 counts" in browser.run("document.getElementById('matrix').getAttribute('aria-label')")
 
 
 def test_of_many_sensors_the_table_is_scrolled_and_the_chosen_one_is_shown_after_a_reload(

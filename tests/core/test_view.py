@@ -38,6 +38,20 @@ def test_before_the_sensor_is_learned_its_counts_are_shown_alone() -> None:
     assert shown is not None and shown["values"] is None and np.allclose(shown["raw"], frames[0].ravel(), atol=0.006)
 
 
+def test_what_a_sensor_of_fractions_feels_is_shown() -> None:
+    frames = swipes(9, 9) / 1e5
+    front_end = FrontEnd(9, 9)
+    peak, noise = 0.0, set()
+    for n, values in enumerate(frames):
+        front_end.push(Frame(n / RATE_HZ, values))
+        shown = view_of(front_end, raw=True)
+        assert shown is not None
+        if shown["values"] is not None:
+            peak, noise = max(peak, *shown["values"]), noise | {shown["noise"]}
+            assert np.allclose(shown["raw"], values.ravel(), rtol=0.0, atol=front_end.noise / 10)
+    assert peak > 10 * max(noise) > 0.0
+
+
 def test_a_bad_taxel_is_marked_and_shows_what_it_is_bridged_with() -> None:
     rng = np.random.default_rng(0)
     frames = swipes(9, 9)

@@ -11,6 +11,7 @@ from gestured.core.events import Gate
 from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.quantiles import median
+from gestured.core.where import digits
 
 # The states of a sensor, from good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
@@ -153,17 +154,18 @@ def view_of(front_end: FrontEnd, *, raw: bool) -> dict[str, Any] | None:
     conditioner, segmenter = front_end.conditioner, front_end.segmenter
     values = bad = centroid = None
     on, off = segmenter.levels(t)
+    decimals = max(2, 1 - math.floor(math.log10(max(front_end.noise, SMALLEST))))
     if look is not None:
         values, bad = conditioner.taxels.bridge(look.above[None])[0], conditioner.taxels.bad
         centroid = conditioner.place(look) if look.activity >= off else None
     return {
         "t": t,
         "grid": list(front_end.grid_sent if values is None else values.shape),
-        "values": None if values is None else _rounded(values),
+        "values": None if values is None else _rounded(values, decimals),
         "bad": [] if bad is None else np.flatnonzero(bad).tolist(),
         "raw_grid": list(front_end.grid_sent),
-        "raw": _rounded(shown) if raw else None,
-        "noise": round(front_end.noise, 3),
+        "raw": _rounded(shown, decimals) if raw else None,
+        "noise": digits(front_end.noise),
         "activity": 0.0 if look is None else round(look.activity, 2),
         "on": round(on, 2),
         "off": round(off, 2),
@@ -172,6 +174,6 @@ def view_of(front_end: FrontEnd, *, raw: bool) -> dict[str, Any] | None:
     }
 
 
-def _rounded(grid: NDArray[Any]) -> list[float]:
-    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
+def _rounded(grid: NDArray[Any], decimals: int) -> list[float]:
+    numbers: list[float] = np.round(grid.astype(np.float64), decimals).reshape(-1).tolist()
     return numbers

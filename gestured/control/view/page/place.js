@@ -13,7 +13,7 @@ function place(told) { // an answer of the sensor that is shown
   over.where = told.where; over.since = state.frames[state.frames.length - 1]?.time ?? 0; // as it is drawn
   const { start, end, way, pressure, contacts, zone } = told.where, spot = p => `${percent(p.x)}, ${percent(p.y)}`;
   at("where").textContent = `${way ? `From ${spot(start)} to ${spot(end)}` : `At ${spot(start)}`} from the left and from below; way ${way.toFixed(2)} of the shorter edge, `
-    + `${Math.round(pressure)} counts, ${contacts === 2 ? "two fingers" : "one finger"}${zone ? `, in the zone ${zone}` : ""}.`;
+    + `${count(pressure)} counts, ${contacts === 2 ? "two fingers" : "one finger"}${zone ? `, in the zone ${zone}` : ""}.`;
 }
 
 function drawOver(g, rows, columns, side, left, time, stroke) {

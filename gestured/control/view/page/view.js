@@ -1,7 +1,7 @@
 "use strict";
 // The page of `gesturectl view`.
 const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100, HOUR_S = 3600, OUTLIERS = .1; // of the frames, which do not stretch the scale
-const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
+const STEPS = [...Array(54).keys()].map(n => Number(`${[1, 2, 5][n % 3]}e${Math.floor(n / 3) - 8}`)); // 1e-8 to 5e9
 const NO_RECORDER = "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const OWN_KEYS = { text: /./, "select-one": /./, range: /^Arrow/, checkbox: / /, submit: / / }; // by type of what has the focus
@@ -10,7 +10,11 @@ const state = { stream: null, sensor: "", frames: [], full: 0, time: 0, paused: 
 const counted = { since: Date.now() / 1000, times: {} }; // by sensor and type: when contacts were answered, s
 
 
-for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
+for (const step of STEPS.filter(step => step >= .01 && step < 1e6)) at("scale").append(new Option(`0 to ${step}`, step));
+
+function count(value) { // as exact as the scale shows it: a sensor may send fractions
+  return String(Number(value.toFixed(Math.max(0, 1 - Math.floor(Math.log10(state.full || 100))))));
+}
 
 function clock(s) { return new Date(1000 * s).toLocaleTimeString("en-GB") + "." + String(Math.floor(s % 1 * 10)); }
 
@@ -190,8 +194,8 @@ function matrix(now, i, full) {
   // Counts as they were sent have a scale of their own: from the least of this frame.
   const least = sent ? Math.min(...values) : 0, bad = new Set(sent ? [] : now.bad);
   let best = 0;
-  write("least", String(Math.floor(least)));
-  write("full", `${Math.ceil(least + full)} counts`);
+  write("least", count(least));
+  write("full", `${count(least + full)} counts`);
   taxels(g, values, columns, side, left, least, full);
   values.forEach((value, n) => {
     if (value > values[best]) best = n;
@@ -205,7 +209,7 @@ function matrix(now, i, full) {
       g.fillStyle = colour((value - least) / full).reduce((a, b) => a + b) > 380 ? "#000" : "#fff";
       g.font = `${Math.max(9 * devicePixelRatio, side / 4)}px ui-monospace, monospace`;
       g.textAlign = "center"; g.textBaseline = "middle";
-      g.fillText(String(Math.round(value)), x + side / 2, y + side / 2);
+      g.fillText(count(value), x + side / 2, y + side / 2);
     }
   });
   const stroke = share => { // light on dark, so that it shows on every colour
@@ -217,7 +221,7 @@ function matrix(now, i, full) {
     drawOver(g, rows, columns, side, left, now.time, stroke);
   }
   const place = `row ${Math.floor(best / columns) + 1}, column ${best % columns + 1}`;
-  canvas.setAttribute("aria-label", `${rows} by ${columns} taxels; strongest ${Math.round(values[best])} counts at ${place}; ${bad.size} bad taxels; ${now.centroid ? "touched" : "not touched"}`);
+  canvas.setAttribute("aria-label", `${rows} by ${columns} taxels; strongest ${count(values[best])} counts at ${place}; ${bad.size} bad taxels; ${now.centroid ? "touched" : "not touched"}`);
 }
 
 function path(g, now, i, side, left, stroke) {
