@@ -49,7 +49,7 @@ STATES = {
         "look at its lines, and at what lies on it; gesturectl recalibrate",
     ),
     "faulty": ("bad", "{bad_taxels} bad taxels", "replace it, or look at its connector"),
-    "stale": ("bad", "was heard {heard_s_ago:.0f} s ago", "is it powered, and is the network up?"),
+    "stale": ("bad", "was heard {heard} ago", "is it powered, and is the network up?"),
     "no_data": ("bad", "is configured, but was never heard", "gesturectl sniff; is its name right?"),
     "intermittent": (
         "bad",
@@ -180,7 +180,8 @@ def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
 def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
     if found := STATES.get(sensor["state"]):  # a newer daemon may have other states
         level, what, remedy = found
-        yield Finding(level, sensor.get("reason") or what.format(**sensor), remedy.format(name=name))
+        what = sensor.get("reason") or what.format(**sensor, heard=span(sensor.get("heard_s_ago", 0.0)))
+        yield Finding(level, what, remedy.format(name=name))
     if sensor.get("closed"):
         remedy = "; ".join(f"gesturectl allow {name} --gate {gate}" for gate in sensor["closed"])
         yield Finding("warn", f"is silent, since gates are closed: {', '.join(sensor['closed'])}", remedy)

@@ -179,6 +179,14 @@ def test_what_still_happens_is_a_finding_and_what_is_over_is_none(daemon: Daemon
         assert found.level == level and bool(found.remedy) == (level == "warn")
 
 
+def test_for_how_many_hours_a_sensor_has_been_silent_is_told(daemon: Daemon) -> None:
+    Sensor(daemon, "still").begin()
+    awaited(daemon, "still", "ok")
+    status = daemon.ask("status")
+    status["sensors"]["still"] |= {"state": "stale", "heard_s_ago": 93784.0}
+    assert "sensor still: was heard 26 h 3 min ago" in [found.what for found in examine_status(status)]
+
+
 def test_a_port_that_is_taken_is_named_with_what_shows_by_whom(run, udp: socket.socket) -> None:
     port = udp.getsockname()[1]
     status, _, err = run("sniff", "--listen", f"127.0.0.1:{port}")
