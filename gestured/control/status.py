@@ -152,7 +152,7 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
         yield "no sensor was heard so far (gesturectl sniff shows what arrives)"
         return
     yield "sensor           state            Hz  jitter   lost  bad  drift gestures  grid"
-    for name, s in list(sensors.items())[:SENSOR_LINES]:
+    for name, s in sorted(sensors.items(), key=lambda one: one[1]["state"] == "ok")[:SENSOR_LINES]:
         numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
         touched = "  touched" if s.get("touched") else ""
         touched += f"  {s['reason']}" if s.get("reason") else ""
@@ -162,7 +162,7 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
         tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"
         yield f"{name[:16]:<16} {s['state']:<12} {numbers} {tail}"
     if len(sensors) > SENSOR_LINES:
-        yield f"and {len(sensors) - SENSOR_LINES} more"
+        yield f"and {len(sensors) - SENSOR_LINES} more: gesturectl doctor"
 
 
 def listens(told: dict[str, Any]) -> str:

@@ -38,12 +38,16 @@ def test_status_of_a_daemon_that_is_not_ready(daemon: Daemon) -> None:
     told = daemon.ask("status")
     silent = {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0, "grid": "9x9"}
     told |= {"sensors": {f"s{i}": silent for i in range(20)}, "input": {"dropped": {"size": 4}, "kernel_drops": 0}}
+    told["sensors"]["s19"] = silent | {"state": "faulty"}
     told["ready"] = {"ready": False, "reason": "no model could classify the last segment"}
     told["model"] |= {"asked": "cnn_lstm", "degraded": True, "failures": 2}
     told["answers"]["cancelled"] = {"held": 2}
     text = "\n".join(screen(told))
     assert "not ready: no model could classify" in text and "a fallback for cnn_lstm, 2 failures" in text
-    assert "and 8 more" in text and "4 size" in text and "2 held" in text
+    assert "s19 " not in text and "and 8 more: gesturectl doctor" in text  # none of them is well
+    told["sensors"] |= {f"s{i}": silent | {"state": "ok"} for i in range(12)}
+    assert re.search("^s19 +faulty", "\n".join(screen(told)), re.MULTILINE)  # it comes before those that are
+    assert "4 size" in text and "2 held" in text
 
 
 @pytest.mark.parametrize(
