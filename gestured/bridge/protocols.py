@@ -103,7 +103,7 @@ class Csv(Protocol):
         lines = data.split(b"\n")[1:-1]
         ((count, often),) = Counter(len(numbers(line)) for line in lines).most_common(1) or [(0, 0)]
         if count >= 4 and often >= FEWEST and often >= MOST_LINES * len(lines):
-            return f"csv with {count} numbers a line"
+            return f"csv with {count} numbers a line (a line is a frame)"
         return None
 
 

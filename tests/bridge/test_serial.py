@@ -287,7 +287,8 @@ def test_bytes_of_another_protocol_are_recognised(bridge, line, udp):
     line.flood(process, b"".join(written("csv", frame(n)) for n in range(1, 60)))
     assert process.end() == 1
     said = process.said().splitlines()[-1]
-    assert "no flexitac frame of 9x9" in said and "these bytes look like csv" in said
+    assert "no flexitac frame of 9x9" in said
+    assert "these bytes look like csv with 81 numbers a line (a line is a frame)" in said
 
 
 def test_nobody_who_listens_is_said_and_heals(bridge, line):
