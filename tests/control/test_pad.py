@@ -268,6 +268,21 @@ def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, brow
             assert not server.pad.contacts.down
 
 
+def test_the_keys_that_a_collection_names_are_pressed_on_the_page_too(browser: Browser) -> None:
+    pressed: list[str] = []
+    with served() as (server, page):
+        server.press = pressed.append
+        browser.call("Page.navigate", url=page.whole)
+        browser.until("typeof state === 'object' && state.seat?.keys")
+        for name, control in (("Enter", 0), ("r", 0), ("r", 2), ("x", 0), ("p", 0)):
+            browser.call("Input.dispatchKeyEvent", type="rawKeyDown", key=name, modifiers=control)
+        browser.run("document.querySelectorAll('#lead button')[2].focus()")
+        browser.call("Input.dispatchKeyEvent", type="keyDown", key="Enter", text="\r")
+        while len(pressed) < 4:
+            browser.run("1")
+    assert sorted(pressed) == ["\n", "d", "p", "r"]
+
+
 @pytest.mark.parametrize("grid", [(9, 9), (27, 15)])
 def test_all_of_a_pad_is_in_the_window(grid: tuple[int, int], browser: Browser) -> None:
     browser.size(1280, 600)

@@ -136,6 +136,11 @@ for (const [key, label] of Object.entries(KEYS)) {
   button.onclick = () => post("key", { key });
   at("lead").lastElementChild.append(button);
 }
+addEventListener("keydown", e => { // as in the terminal, whose words name them
+  const key = e.key === "Enter" ? "\n" : e.key;
+  const own = e.key === "Enter" && e.target.tagName === "BUTTON"; // it presses its own
+  if (state.seat?.keys && Object.hasOwn(KEYS, key) && !own && !e.repeat && !e.ctrlKey && !e.altKey && !e.metaKey) post("key", { key });
+});
 for (const kind of ["pointerdown", "pointermove"]) pad.addEventListener(kind, touched);
 for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(kind, left);
 pad.addEventListener("contextmenu", e => e.preventDefault());
