@@ -196,10 +196,11 @@ class Show:
             found = [f'  export PATH="{program.parent}:$PATH"'] if program.name == "gesturectl" else []
             say(
                 "",
-                "Next, a daemon of your own, a sensor that somebody touches, and a listener, each in a terminal",
-                f"that begins with {'these lines' if found else 'this line'}:",
+                "Next, a daemon of your own, a sensor that somebody touches, and a listener. Open three terminals,",
+                f"and begin each with {'these lines' if found else 'this line'}:",
                 *found,
                 "  export GESTURED_SOCKET=/tmp/gestured.sock",
+                "Then run one of these in each:",
                 f"  gestured --model {self.model}",
                 "  gesturectl simulate --sensor armrest",
                 "  gesturectl listen",

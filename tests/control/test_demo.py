@@ -145,6 +145,7 @@ def test_without_a_terminal_it_says_words_and_goes_on_while_its_pad_is_open(star
     status, out, err = ended(process)
     assert (status, err) == (0, "") and "Summary" in out
     (exported,) = [line for line in out.splitlines() if "export " in line]
+    assert "Then run one of these in each:\n  gestured --" in out  # not all in one
     assert exported.strip() in Path(gestured.__file__, "../../README.md").resolve().read_text().splitlines()
     assert daemons(shallow) == [] and os.listdir(shallow) == []
 
