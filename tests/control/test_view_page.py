@@ -351,6 +351,8 @@ def test_of_many_sensors_the_table_is_scrolled_and_the_chosen_one_is_shown_after
     browser.run(f"arm = {arm!r}; kinds.sensors = {more}")
     browser.until("document.querySelectorAll('#sensors tbody tr').length > 40")
     assert browser.run("document.querySelector('.scroll').clientHeight") < 400
+    browser.size(1280, 900)
+    assert browser.run("(e => e.scrollWidth === e.clientWidth)(document.querySelector('.scroll'))")  # all columns
     browser.call("Page.reload")
     browser.until(f"typeof state === 'object' && state.sensor === {arm!r} && state.drawn > 0")
     assert browser.run("document.getElementById('sensor').value") == arm
