@@ -82,10 +82,11 @@ def saturated(contact: NDArray[np.floating]) -> bool:
     """Whether the pressure of a contact (T, R, C) in counts was cut off at the top.
 
     Counts under a finger vary, and at the end of their range they stand still. A contact with fewer than `FINEST` steps
-    of counts is never called cut off.
+    of counts, the smallest of which may be a fraction, is never called cut off.
     """
-    top = contact.max()
-    if top - contact.min() < FINEST:
+    counts = np.unique(contact)
+    top = counts[-1]
+    if len(counts) < 2 or top - counts[0] < FINEST * np.diff(counts).min():
         return False
     at_top = (contact == top).sum(axis=(1, 2))
     return bool((at_top > 0).sum() >= max(RAIL_FRAMES, RAIL_SHARE * len(contact)) or at_top.max() >= RAIL_TAXELS)

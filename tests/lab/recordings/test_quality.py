@@ -27,12 +27,16 @@ def test_ordinary_gestures_are_good(gesture: str) -> None:
         assert faults(performed(gesture, person, nominal), gesture) == []
 
 
-def test_a_sensor_that_ends_below_the_pressure_is_told() -> None:
+@pytest.mark.parametrize("unit", [1.0, 1 / 1024], ids=["counts", "fractions"])
+def test_a_sensor_that_ends_below_the_pressure_is_told(unit: float) -> None:
     told = 0
     for person in range(900, 920):
         nominal = replace(SimulatedSensor.nominal(day=person), loss=0.0, late=0.0)
         low = replace(nominal, saturation=int((nominal.offset + 0.4) * nominal.gain))
-        told += any("saturated" in fault for fault in faults(performed("swipe_left", person, low), "swipe_left"))
+        take = performed("swipe_left", person, low)
+        scaled = [replace(frame, values=frame.values.astype(float) * unit) for frame in take.frames]
+        take = replace(take, frames=tuple(scaled))
+        told += any("saturated" in fault for fault in faults(take, "swipe_left"))
     assert told >= 18
 
 
