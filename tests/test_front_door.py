@@ -5,6 +5,8 @@ import json
 import pickle
 import subprocess
 import sys
+import threading
+from argparse import Namespace
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
@@ -14,6 +16,7 @@ import numpy as np
 import pytest
 
 import gestured
+from gestured.client.program import INTERRUPTED, Parser, run
 from gestured.core.events import Onset
 from gestured.core.frames import Frame, Touch
 from gestured.core.front_end import Cut, FrontEnd
@@ -41,22 +44,47 @@ def test_importing_the_package_imports_nothing_else():
 
 
 @pytest.mark.parametrize(
-    ("program", "status"), [("control", 1), ("bridge", 0), ("lab", 130)], ids=["gesturectl", "bridge", "lab"]
+    ("program", "words", "status"),
+    [("control", "tune", 130), ("control", "simulate", 0), ("bridge", "serial", 0), ("lab", "collect", 130)],
 )
-def test_ctrl_c_while_a_program_imports_its_modules_leaves_no_traceback(program: str, status: int):
+def test_ctrl_c_while_a_program_imports_its_modules_leaves_no_traceback(program: str, words: str, status: int):
     code = """
-import sys
+import os, signal, sys
 class Interrupted:
     def find_spec(self, name, *_):
         if name == "numpy":
-            raise KeyboardInterrupt
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                raise ImportError("as some libraries take an exception of a handler")
 sys.meta_path.insert(0, Interrupted())
 from gestured.{}.cli import main
 sys.exit(main())
 """
-    command = [sys.executable, "-c", code.format(program), "--help"]
+    command = [sys.executable, "-c", code.format(program), words, "--help"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (status, "", "")
+
+
+@pytest.mark.parametrize("stopped", [0, INTERRUPTED])
+def test_an_error_that_ctrl_c_causes_is_the_end_that_was_asked_for(stopped: int):
+    def waits(args: Namespace) -> int:
+        lock = threading.Lock()
+        with lock:
+            lock.release()  # as the `wait` of a condition does
+            if args.words == "ctrl-c":
+                raise KeyboardInterrupt
+        return 0
+
+    def parser() -> Parser:
+        top = Parser()
+        top.add_argument("words")
+        top.set_defaults(run=waits)
+        return top
+
+    assert run(parser, ["ctrl-c"], stopped) == stopped
+    with pytest.raises(RuntimeError, match="lock"):
+        run(parser, ["by itself"], stopped)
 
 
 def test_what_listens_needs_neither_numpy_nor_a_model():

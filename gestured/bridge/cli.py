@@ -25,7 +25,4 @@ def parser() -> Parser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one bridge until it is ended; returns the exit status (0 ended, 1 cannot work, 2 wrong usage)."""
-    try:
-        return run(parser(), argv)
-    except KeyboardInterrupt:  # Ctrl-C during the imports of the bridges
-        return 0
+    return run(parser, argv, 0)

@@ -3,13 +3,16 @@
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TextIO, TypeAlias
 
 import gestured
 from gestured.client.lines import JOIN, Forbidden
 from gestured.client.say import say
+from gestured.client.stop import ctrl_c_ends
 from gestured.core.errors import GesturedError
+
+INTERRUPTED = 130  # the exit status after Ctrl-C, as in a shell
 
 
 class Parser(argparse.ArgumentParser):
@@ -31,24 +34,38 @@ def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser
     return parser, parser.add_subparsers(metavar=kind, required=True)
 
 
-def run(parser: Parser, argv: Sequence[str] | None) -> int:
-    """Run the subcommand of `argv`. Returns its exit status, 0 after Ctrl-C, 1 with a sentence for a GesturedError."""
+def run(parser: Callable[[], Parser], argv: Sequence[str] | None, stopped: int = INTERRUPTED) -> int:
+    """Run the subcommand of `argv`. Returns its exit status, 1 with a sentence for a GesturedError.
+
+    `parser` may import modules that take long. `stopped` is the status after Ctrl-C.
+    """
     # A stream is None if it was closed when the process began.
     sys.stdout = sys.stdout or open(os.devnull, "w")
     sys.stderr = sys.stderr or open(os.devnull, "w")  # else `print` would write its sentences to standard output
-    args = parser.parse_args(argv)
     try:
+        with ctrl_c_ends(stopped):  # an import would turn its exception into an error of its own
+            made = parser()
+            args = made.parse_args(argv)
         status: int = args.run(args)
     except GesturedError as error:
         remedy = f" ({JOIN})" if isinstance(error, Forbidden) else ""
-        say(f"{parser.prog}: {error}{remedy}", to=sys.stderr)
+        say(f"{made.prog}: {error}{remedy}", to=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 0
+    except (KeyboardInterrupt, Exception) as error:
+        if not _by_ctrl_c(error):
+            raise
+        return stopped
     finally:
         for stream in (sys.stdout, sys.stderr):
             _give_up(stream)
     return status
+
+
+def _by_ctrl_c(error: BaseException | None) -> bool:
+    """Whether Ctrl-C raised this, or its cause: where it interrupts a lock's wait, that raises a RuntimeError."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 def _give_up(stream: TextIO) -> None:

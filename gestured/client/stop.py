@@ -1,5 +1,6 @@
 """The signals that ask a program to end: SIGTERM, Ctrl-C (SIGINT), or a terminal that is closed (SIGHUP)."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -35,3 +36,17 @@ def stop_later() -> Iterator[None]:
             signal.signal(number, handler)
         if asked:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def ctrl_c_ends(status: int) -> Iterator[None]:
+    """A context in which Ctrl-C ends the process at once, and raises nothing."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:  # such as in the background of a shell, which ignores it
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: os._exit(status))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -3,6 +3,7 @@
 import io
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 
 from gestured.client import program
@@ -26,6 +27,7 @@ SUBCOMMANDS = (
     ("check", ("check",)),
     ("demo", ("demo",)),
 )
+ENDLESS = {"listen", "view", "pad", "simulate", "demo"}  # Ctrl-C is how they end; what others do, it cuts short
 
 
 def parser(argv: Sequence[str] = ()) -> program.Parser:
@@ -43,13 +45,12 @@ def parser(argv: Sequence[str] = ()) -> program.Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one subcommand; returns the exit status (0 done, 1 failed, 2 wrong usage, 3 unusable model)."""
+    """Run one subcommand; returns 0 (done), 1 (failed), 2 (wrong usage), 3 (unusable model) or 130 (cut short)."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without block characters shows question marks
+    given = sys.argv[1:] if argv is None else argv
+    endless = bool({*given[:1]} & ENDLESS) or "--watch" in given
     try:
-        given = sys.argv[1:] if argv is None else argv
-        return program.run(parser(given), given)
-    except KeyboardInterrupt:  # Ctrl-C during the imports, before anything was done
-        return 1
+        return program.run(partial(parser, given), given, 0 if endless else program.INTERRUPTED)
     except BrokenPipeError:  # the reader of the output, such as `head`, has ended
         return 0

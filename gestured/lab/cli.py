@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gestured.client.program import Parser, program, run
+from gestured.client.program import INTERRUPTED, Parser, program, run
 from gestured.client.say import say
 from gestured.client.stop import stop_as_by_ctrl_c, stop_later
 from gestured.client.values import number
@@ -27,7 +27,6 @@ FOLDERS = {
     "collect": ("out",),
 }  # fmt: skip
 KEEPS = ("train", "adapt", "evaluate", "study", "collect")  # commands that can be continued after an interruption
-INTERRUPTED = 130  # the exit status after Ctrl-C, as in a shell
 # The module whose `run` each command is. It is imported only for that command, since some imports take seconds, or need
 # packages that others do not.
 PROGRAMS = {
@@ -158,14 +157,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks some letters shows question marks
     given = sys.argv[1:] if arguments is None else arguments
-    try:
+
+    def made() -> Parser:
         from gestured.lab.made_of import command_of
 
         top = parser()
         top.set_defaults(words=command_of(["gestured-lab", *given]))
-        return run(top, given)
-    except KeyboardInterrupt:  # while modules were imported: nothing has been done
-        return INTERRUPTED
+        return top
+
+    return run(made, given)
 
 
 def _run(args: argparse.Namespace) -> int:
