@@ -103,13 +103,14 @@ class Sensor:
         self.unheard = 0  # packets that a closed port has refused
         self.start = time.monotonic()
         self.epoch = time.time()
-        self.begun, self.stop = threading.Event(), threading.Event()
+        self.stop = threading.Event()
 
     def send(self, frames: Iterable[tuple[int, Frame]]) -> None:
         """Send each (counter, frame) until `stop` is set; a late frame is sent at once. Raises GesturedError."""
         for counter, frame in frames:
             wait = self.start + frame.t - time.monotonic()
-            if self.stop.wait(max(wait, 0.0)):
+            time.sleep(max(wait, 0.0))  # a wait for `stop` may keep its lock after Ctrl-C, and `close` needs that lock
+            if self.stop.is_set():
                 return
             packet = self.form.packet(frame, counter, self.moment(frame.t))
             try:
@@ -117,7 +118,6 @@ class Sensor:
             except OSError as error:
                 raise GesturedError(f"cannot send to {self.to}: {error.strerror}") from error
             self.sent += 1
-            self.begun.set()
 
     def moment(self, t: float) -> float:
         """The time `t` of a frame in seconds since the Unix epoch."""

@@ -108,7 +108,9 @@ def pad(engine: Engine, grid: tuple[int, int], rate_hz: float, after: Sensor) ->
 
     The pad begins after the simulated sensor, since the page of `view` shows the sensor that was heard first.
     """
-    after.begun.wait(BEGUN_S)
+    end = time.monotonic() + BEGUN_S
+    while not after.sent and time.monotonic() < end:
+        time.sleep(POLL_S)
     server = PadServer(Address("127.0.0.1", 0), Pad(engine.listen, "pad", grid, min(rate_hz, 200.0)), "the demo")
     return server.serve(engine.socket)
 

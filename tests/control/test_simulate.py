@@ -5,8 +5,12 @@ import json
 import re
 import signal
 import socket
+import sys
+import threading
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -20,6 +24,7 @@ from gestured.core.frames import Frame
 from gestured.simulator import GESTURES
 from gestured.simulator.places import PLACES
 from gestured.simulator.resting import POSTURES
+from tests.daemon.harness import DEADLINE_S
 
 FRAMES = 30  # 2 seconds at 15 Hz
 
@@ -88,6 +93,32 @@ def test_ctrl_c_ends_it(start, udp):
     _, err = process.communicate(timeout=30)
     assert process.returncode == 0
     assert b"Traceback" not in err
+
+
+def test_after_ctrl_c_at_any_moment_a_sensor_can_be_closed(udp):
+    """It comes at a line of Python, also at one of the standard library's."""
+    frames = [(n, Frame(0.002 * n, np.zeros((9, 9)))) for n in range(2)]
+    done, moment = False, 0
+    while not done:
+        sensor, left, moment = Sensor(udp.getsockname(), Form("a")), count(moment, -1), moment + 1
+
+        def trace(*_: Any, left: Iterator[int] = left) -> Any:
+            if not next(left):
+                raise KeyboardInterrupt
+            return trace
+
+        with suppress(KeyboardInterrupt):
+            sys.settrace(trace)
+            try:
+                sensor.send(frames)
+                done = True
+            finally:
+                sys.settrace(None)
+        closing = threading.Thread(target=sensor.close, daemon=True)
+        closing.start()
+        closing.join(DEADLINE_S)
+        assert not closing.is_alive()
+    assert moment > 10
 
 
 class Unpaced(Sensor):
