@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import accumulate, groupby
 from operator import sub
 from pathlib import Path
 from statistics import median
@@ -136,9 +136,9 @@ class Replay:
         self._tape = tape
         # By sensor and the time of packets (ns): onsets of the contacts that these opened in the daemon, s since 1970.
         self._told: dict[tuple[str, int], list[float]] = {}
-        for t_ns, event in zip(tape.told_ns, tape.events, strict=False):
-            if event["type"] == "onset":
-                self._told.setdefault((event["sensor"], t_ns), []).append(event["onset"])
+        for n, event in zip(tape.told, tape.events, strict=False):
+            if event["type"] == "onset" and n:
+                self._told.setdefault((event["sensor"], tape.packets[n - 1].t_ns), []).append(event["onset"])
         # By sensor: s by which the latest onsets were later in the daemon.
         self._ahead: dict[str, deque[float]] = {}
 
@@ -150,19 +150,25 @@ class Replay:
 
     def facts(self) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
         """All facts of the tape, events included; each frame that was used is a fact of its own."""
-        now = 0.0
-        gates = deque(event for event in self._tape.events if event["type"] == "gate")
+        now, count = 0.0, 0  # count: packets before this group
+        told = zip(self._tape.told, self._tape.events, strict=False)
+        gates = deque((n, event) for n, event in told if event["type"] == "gate")
+        # By number of packets from the end: the oldest of these. After it stood still, a daemon serves packets in
+        # another order than they came in, and does not decide by a time from which packets still wait.
+        oldest = list(accumulate((packet.t_ns for packet in reversed(self._tape.packets)), min))
         for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
             now, before = (t_ns - self._start) / 1e9, now
             if not self._tape.scene:  # made by no daemon that could have stood still: a pause is a silence
                 silent = before + 2 * self._hub.scene.stale_s
                 yield from self._seen(self._hub.tick(silent) if silent < now else [])
-            while gates and gates[0]["since"] - self.epoch < now:
-                yield from self._seen(self._gate(gates.popleft()))
-            facts = self._hub.receive([(packet.data, packet.source) for packet in packets], now)
+            while gates and gates[0][0] <= count:
+                yield from self._seen(self._gate(gates.popleft()[1]))
+            waiting = [(packet.data, packet.source) for packet in packets]
+            facts = self._hub.receive(waiting, now)
             self._compare([fact for fact in facts if isinstance(fact, Onset)], t_ns)
             yield from self._seen(facts)
-            yield from self._seen(self._hub.tick(now))
+            yield from self._seen(self._hub.tick((oldest[-1 - count] - self._start) / 1e9))
+            count += len(waiting)
         yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
 
     def _compare(self, opened: list[Onset], t_ns: int) -> None:

@@ -51,11 +51,11 @@ class Packet:
 class Tape:
     """The content of a file, in the order of writing. `whole` is false if writing was cut off.
 
-    `told_ns` has the log time of each event, which is the time of the last packets before it.
+    `told` has the number of packets before each event.
     """
 
     scene: Mapping[str, Any]
     packets: tuple[Packet, ...]
     events: tuple[Mapping[str, Any], ...]
     whole: bool
-    told_ns: tuple[int, ...] = ()
+    told: tuple[int, ...] = ()

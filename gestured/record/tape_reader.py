@@ -42,7 +42,7 @@ def read(path: str | Path) -> Tape:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
     if reading.scene is None:
         raise RecordingError(f"{path}: has no metadata {SCENE!r}, expected a recording of gesturectl (MCAP)")
-    return Tape(reading.scene, tuple(reading.packets), tuple(reading.events), whole, tuple(reading.told_ns))
+    return Tape(reading.scene, tuple(reading.packets), tuple(reading.events), whole, tuple(reading.told))
 
 
 class _Wrong(Exception):
@@ -56,7 +56,7 @@ class _Reading:
         self.scene: Mapping[str, Any] | None = None
         self.packets: list[Packet] = []
         self.events: list[Mapping[str, Any]] = []
-        self.told_ns: list[int] = []
+        self.told: list[int] = []
         self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" if it is not ours; source
 
     def take(self, record: Any, budget: Budget) -> None:
@@ -92,7 +92,7 @@ class _Reading:
             if event is None or wrong is not None:
                 raise _Wrong(f"event {len(self.events) + 1}: {wrong}")
             self.events.append(event)
-            self.told_ns.append(message.log_time)
+            self.told.append(len(self.packets))
 
 
 def _source(text: str) -> Address:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gestured.core.address import Address
 from gestured.core.classifier import Scores
 from gestured.core.events import Event, Gate, Gesture, Provisional, Unknown
 from gestured.core.facts import Changed, Decided
@@ -19,10 +20,11 @@ from gestured.core.messages import to_json
 from gestured.core.points import Certainty, Point
 from gestured.core.scene import Scene, Setup
 from gestured.record.replay import Replay, opened
+from gestured.record.tape import Packet, Tape
 from tests.core.test_foresight import Seer
 from tests.core.test_foresight import recognizer as foreseeing
 from tests.core.test_foresight import says as foretold
-from tests.core.test_hub import FIRST, GESTURES, Arrived, Sure, stream, write
+from tests.core.test_hub import FIRST, GESTURES, SECOND, Arrived, Sure, stream, write
 from tests.core.test_sensor import SWIPE, Fake, answers, recognizer, run, says, swipes
 from tests.daemon.harness import Hand
 from tests.scenario import frames
@@ -281,3 +283,23 @@ def test_a_replay_has_the_gates_and_the_arming_of_its_tape(tmp_path: Path) -> No
     tape, maker = opened(write(tmp_path / "a.mcap", DRIVE, [before, *lines], **told))
     again = [fact for fact in Replay(tape, maker.scene, Sure()).facts() if isinstance(fact, Gesture | Unknown)]
     assert reasons(again) == reasons(facts)
+
+
+def test_a_replay_has_the_order_in_which_a_daemon_that_stood_still_served_packets() -> None:
+    """It first serves a sensor that came again meanwhile, and closes a gate of `seat` before it serves the packets."""
+    hand = Hand(2)
+    arm, seat = (stream(name, hand.idle(1.5) + hand.swipe("left") + hand.idle(1.0), FIRST) for name in ("arm", "seat"))
+    late = stream("late", hand.idle(1.0), SECOND)
+    before, after = sorted(arm[:25] + seat[:25] + late), sorted(arm[25:] + seat[25:])
+    before.append((after[-1][0], late[-1][1], SECOND))
+    now = before[-1][0]
+    hub, facts = Hub(SCENE, Sure()), list[Any]()
+    for n, (t, data, source) in enumerate(before + after):
+        facts += hub.put("seat", ["door"], now) if n == len(before) else []
+        facts += hub.receive([(data, source)], t)
+    assert reasons(facts + hub.flush(now + 1.0)) == ["swipe", "inhibited"]
+    gate = {"type": "gate", "sensor": "seat", "closed": ["door"], "since": now}
+    packets = [Packet(round(1e9 * t), Address(*source), data) for t, data, source in before + after]
+    tape = Tape({"settings": {}}, tuple(packets), (gate,), whole=True, told=(len(before),))
+    again = [fact for fact in Replay(tape, SCENE, Sure()).facts() if isinstance(fact, Gesture | Unknown)]
+    assert reasons(again) == ["swipe", "inhibited"]

@@ -240,9 +240,12 @@ def write(path: Path, arrived: list[Arrived], events: Sequence[Mapping[str, Any]
         } | settings,
     }  # fmt: skip
     with tape_writer.Writer(path, told, 1 << 30) as writer:
+        rest = [*events]
         for t, packet, source in sorted(arrived):
+            while rest and rest[0].get("since", math.inf) < t + 1e9:
+                writer.event(0, rest.pop(0))
             writer.packet(round((t + 1e9) * 1e9), f"{source[0]}:{source[1]}", packet)
-        for event in events:
+        for event in rest:
             writer.event(0, event)
     return path
 
