@@ -6,6 +6,7 @@ import math
 import signal
 import socket
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -27,7 +28,7 @@ from gestured.simulator import GESTURES, SimulatedSensor
 from gestured.simulator.live import LiveTextile
 from tests.control.browser import Browser
 from tests.control.pages import Page, Stream
-from tests.daemon.harness import Sensor
+from tests.daemon.harness import DEADLINE_S, Sensor
 from tests.sockets import FakeDaemon, free_address
 
 Way = Callable[[float], tuple[float, float]]  # share of the time -> x, y, from the bottom-left corner
@@ -159,6 +160,15 @@ def served(
     pad = Pad(to or free_address(), "pad", grid, 15.0)
     with PadServer(Address("127.0.0.1", 0), pad, "gesturectl pad", **more).serve() as server:
         yield server, Page(server.page)
+
+
+def test_a_pad_that_ends_before_it_is_served_does_not_hang():
+    """As if Ctrl-C came in between."""
+    server = PadServer(Address("127.0.0.1", 0), Pad(free_address(), "pad", (9, 9), 15.0), "gesturectl pad")
+    ending = threading.Thread(target=server.__exit__, daemon=True)
+    ending.start()
+    ending.join(DEADLINE_S)
+    assert not ending.is_alive()
 
 
 def seat(page: Page) -> tuple[Stream, int]:

@@ -40,6 +40,7 @@ class PadServer(Server):
             raise GesturedError(f"--listen {listen}: expected one address of this machine, such as {DEFAULT}")
         self.pad = pad
         self.ended = threading.Event()
+        self._serving = threading.Thread(target=self.serve_forever, daemon=True)
         self.press: Callable[[str], None] | None = None  # takes a key of the page, if keys are wanted
         self._said = ""  # the last words of `say`
         self._idle_s, self._used = idle_s, time.monotonic()
@@ -51,7 +52,7 @@ class PadServer(Server):
         """Serve from now on, in threads; the page shows the sensor's events of the daemons with these event sockets."""
         events = Subscriber(*sockets, types=HEARD, sensors=[self.pad.name], timeout=SILENT_S) if sockets else None
         self.pad.begin(self.tell, events)
-        threading.Thread(target=self.serve_forever, daemon=True).start()
+        self._serving.start()
         return self
 
     @property
@@ -129,7 +130,8 @@ class PadServer(Server):
     def __exit__(self, *_: object) -> None:
         self.door.closed = True
         self.pad.close()
-        self.shutdown()
+        if self._serving.is_alive():  # else `shutdown` would wait for ever
+            self.shutdown()
         self.leave(self._outbox)
         self.server_close()
 
