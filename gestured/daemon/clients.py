@@ -1,6 +1,7 @@
 """The event stream: JSON lines to any number of clients on a Unix socket. A line is encoded once for all of them."""
 
 import asyncio
+import resource
 import select
 import socket
 import time
@@ -18,6 +19,7 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import AGAIN_S, reason_of
 
 CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
+KEPT = 136  # descriptors that no client gets: they are for operators (20), bridges (20), metrics (64) and a reload
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 LINES = 16  # requests of all clients that are answered before the loop serves frames again
 ACCEPTED = 64  # connections that are accepted before the loop serves frames again
@@ -151,11 +153,13 @@ class EventServer:
                 self.loop.call_later(AGAIN_S, self.loop.add_reader, self._listener, self._accept)
                 return
             sock.setblocking(False)
-            if len(self._clients) >= CLIENTS:
+            descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+            # A new descriptor has the lowest free number, so that below it none is free.
+            if (count := len(self._clients)) >= CLIENTS or 0 <= descriptors <= sock.fileno() + KEPT:
                 self.metrics.evicted.add("too_many")
-                self._throttle.warn("client turned away", "too many clients", limit=CLIENTS)
+                self._throttle.warn("client turned away", "too many clients", limit=count)
                 with sock, suppress(OSError):
-                    sock.send(messages.error_json(f"more than {CLIENTS} clients"))
+                    sock.send(messages.error_json(f"more than {count} clients"))
                 continue
             client = Client(self, sock)
             self._clients.add(client)

@@ -29,7 +29,7 @@ from gestured.daemon.sockets import AddressError
 from gestured.model.process import end_all
 
 DESCRIPTORS = 4096  # wanted, for 1024 clients; the usual soft limit is 1024 in all
-FEWEST_DESCRIPTORS = 64  # needed for the daemon itself, operators, destinations and a few clients
+FEWEST_DESCRIPTORS = 256  # needed for the daemon itself, destinations, some clients, and what is kept from clients
 STOPS = (signal.SIGTERM, signal.SIGINT)
 END_S = 4.0  # s for open contacts, and for clients to read their answers; systemd's units allow 5
 

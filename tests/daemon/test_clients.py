@@ -2,9 +2,10 @@
 
 import asyncio
 import json
+import resource
 import socket
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,10 @@ from gestured.core.messages import Subscription
 from gestured.daemon import client as one_client
 from gestured.daemon import clients
 from gestured.daemon.clients import EventServer
+from gestured.daemon.control import OPERATORS, OPERATORS_KEPT
+from gestured.daemon.http import HTTP_CONNECTIONS
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.start import FEWEST_DESCRIPTORS
 from tests.daemon.harness import Daemon, Sensor
 
 
@@ -128,6 +132,22 @@ async def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeyp
         assert json.loads(c.recv(99))["type"] == "error" and c.recv(99) == b""
         assert server.count == 2 and metrics.evicted.values == {("too_many",): 1}
         await server.close(0)
+
+
+def test_clients_leave_descriptors_for_operators_metrics_and_a_reload(start) -> None:
+    daemon = start("--metrics", "127.0.0.1:0")
+    limit = resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE)
+    resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (FEWEST_DESCRIPTORS, limit[1]))
+    with ExitStack() as held:
+        told = [held.enter_context(closing(daemon.client())).hello for _ in range(FEWEST_DESCRIPTORS)]
+        host, port = daemon.ready["metrics"].rsplit(":", 1)
+        for _ in range(HTTP_CONNECTIONS):
+            held.enter_context(socket.create_connection((host, int(port)))).sendall(b"GET /")
+        operators = [held.enter_context(daemon.control()) for _ in range(OPERATORS + OPERATORS_KEPT)]
+        assert all(operator.ask("reload")["ok"] for operator in operators)
+        assert daemon.get("/healthz")[0] == 200
+    assert [line["type"] for line in told] == sorted((line["type"] for line in told), reverse=True)
+    assert told[0]["type"] == "hello" and told[-1]["type"] == "error"
 
 
 async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
