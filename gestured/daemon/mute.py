@@ -5,6 +5,7 @@ is a list of rules: the first that matches a packet decides, and a packet that n
 """
 
 import array
+import errno
 import ipaddress
 import math
 import socket
@@ -22,9 +23,9 @@ FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts tw
 LONGEST_S = 8.0  # the longest that a sender is muted, so that one that has ended its flood is soon heard
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
 NETWORK = 0xFFF00000
-LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # BPF
+LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x05, 0x15, 0x06  # BPF
 LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
-MOST_RULES = 256  # rules of one filter, at most 13 instructions each; the kernel takes 4096 instructions
+MOST_RULES = 256  # rules of one filter, at most 15 instructions each; the kernel takes 4096 instructions
 
 Sender = Source | str  # host and port, or a host for all its ports
 
@@ -88,33 +89,47 @@ class Rule(NamedTuple):
 
 
 def mute(sock: socket.socket, rules: Iterable[Rule]) -> None:
-    """Filter a UDP socket by these rules; without any, let in everything. Raises OSError."""
-    program = b"".join(_instructions(rule) for rule in list(rules)[:MOST_RULES])
-    if not program:
-        sock.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
-        return
-    program += _step(RETURN, LET_IN)
-    code = array.array("B", program)
-    address, size = code.buffer_info()
-    sock.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, struct.pack("@HP", size // 8, address))
+    """Filter a UDP socket by these rules, as many as the kernel takes; without any, let in everything. Raises OSError.
+
+    Before Linux 6.8 a filter may have 20 KiB (net.core.optmem_max) in the kernel's own instructions.
+    """
+    kept = list(rules)[:MOST_RULES]
+    while kept:
+        code = array.array("B", _program(kept))
+        address, size = code.buffer_info()
+        try:
+            sock.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, struct.pack("@HP", size // 8, address))
+            return
+        except OSError as error:
+            if error.errno != errno.ENOMEM:
+                raise
+            kept = kept[: len(kept) // 2]
+    sock.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
 
 
-def _step(what: int, value: int, otherwise: int = 0) -> bytes:
-    """One BPF instruction; a comparison that fails skips `otherwise` instructions."""
-    return struct.pack("@HBBI", what, 0, otherwise, value)
+def _program(rules: Iterable[Rule]) -> bytes:
+    by_host: dict[ipaddress.IPv4Address | ipaddress.IPv6Address, list[Rule]] = {}
+    for rule in rules:
+        address = ipaddress.ip_address(rule.host.partition("%")[0])
+        by_host.setdefault(getattr(address, "ipv4_mapped", None) or address, []).append(rule)
+    return b"".join([_block(*one) for one in by_host.items()]) + _step(RETURN, LET_IN)
 
 
-def _instructions(rule: Rule) -> bytes:
-    address = ipaddress.ip_address(rule.host.partition("%")[0])
-    address = getattr(address, "ipv4_mapped", None) or address
+def _block(address: ipaddress.IPv4Address | ipaddress.IPv6Address, rules: Iterable[Rule]) -> bytes:
+    """What is done with the packets of one host. The port is loaded once for all rules, since a load costs most."""
+    block = _step(LOAD_HALF, 0)
+    for rule in rules:
+        block += _step(JUMP_EQUAL, rule.port, otherwise=1) if rule.port is not None else b""
+        block += _step(RETURN, LET_IN if rule.let_in else THROW_AWAY)
     version, start = (0x40, 12) if address.version == 4 else (0x60, 8)
     words = struct.unpack(f">{len(address.packed) // 4}I", address.packed)
-    checks = [(LOAD_WORD, NETWORK + start + 4 * n, word) for n, word in enumerate(words)]
-    if rule.port is not None:
-        checks.append((LOAD_HALF, 0, rule.port))
-    left = 2 * len(checks) + 1  # instructions after the check of the version
-    steps = [_step(LOAD_BYTE, NETWORK), _step(AND, 0xF0), _step(JUMP_EQUAL, version, left)]
-    for load, where, wanted in checks:
-        left -= 2
-        steps += [_step(load, where), _step(JUMP_EQUAL, wanted, left)]
-    return b"".join([*steps, _step(RETURN, LET_IN if rule.let_in else THROW_AWAY)])
+    steps = [_step(LOAD_BYTE, NETWORK), _step(AND, 0xF0), _step(JUMP_EQUAL, version, otherwise=2 * len(words))]
+    for left, word in zip(range(len(words) - 1, -1, -1), words, strict=True):
+        steps += [_step(LOAD_WORD, NETWORK + start), _step(JUMP_EQUAL, word, then=not left, otherwise=2 * left)]
+        start += 4
+    return b"".join([*steps, _step(JUMP, len(block) // 8), block])
+
+
+def _step(what: int, value: int, then: int = 0, otherwise: int = 0) -> bytes:
+    """One BPF instruction; a comparison skips `then` instructions if it holds, else `otherwise`."""
+    return struct.pack("@HBBI", what, then, otherwise, value)

@@ -1,11 +1,25 @@
 """The kernel throws away what is muted, and nothing else."""
 
+import ctypes
+import errno
 import ipaddress
 import socket
+import struct
 
 import pytest
 
-from gestured.daemon.mute import FIRST_S, HEADER_BYTES, LONGEST_S, TOO_MUCH, Muted, Rule, mute
+from gestured.daemon.mute import (
+    FIRST_S,
+    HEADER_BYTES,
+    LONGEST_S,
+    MOST_RULES,
+    RETURN,
+    THROW_AWAY,
+    TOO_MUCH,
+    Muted,
+    Rule,
+    mute,
+)
 
 
 class Wire:
@@ -62,10 +76,13 @@ def test_a_muted_host_is_not_heard_but_for_the_ports_that_are_let_in(wire: Wire)
     assert wire.heard(loud, steady, other) == [True] * 3
 
 
-def test_a_muted_port_says_nothing_of_its_host(wire: Wire) -> None:
+def test_a_muted_port_says_nothing_of_its_host_or_of_others(wire: Wire) -> None:
     loud, steady = wire.sender("127.0.0.2"), wire.sender("127.0.0.2")
-    mute(wire.receiver, [Rule("::ffff:127.0.0.2", loud.getsockname()[1], False)])
-    assert wire.heard(loud, steady) == [False, True]
+    more = [wire.sender(host) for host in ("127.0.0.3", "127.0.0.4")]
+    ports = [loud.getsockname()[1], *(port for port in range(1, 200))]
+    rules = [Rule("127.0.0.4", None, False), *(Rule("::ffff:127.0.0.2", port, False) for port in ports)]
+    mute(wire.receiver, rules)
+    assert wire.heard(loud, steady, *more) == [False, True, True, False]
 
 
 def test_hosts_with_long_addresses() -> None:
@@ -83,6 +100,39 @@ def test_more_rules_than_the_kernel_takes_are_cut_off(wire: Wire) -> None:
     first = wire.sender("127.0.0.2")
     mute(wire.receiver, [Rule("127.0.0.2", None, False)] + [Rule("::1", port, False) for port in range(1000)])
     assert wire.heard(first) == [False]
+
+
+class Old:
+    """The kernel's side of a socket that takes filters of at most so many bytes, as net.core.optmem_max bounds them."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self.muted = 0  # rules in the filter that throw away
+
+    def setsockopt(self, level: int, option: int, value: bytes | int) -> None:
+        assert isinstance(value, bytes)
+        count, address = struct.unpack("@HP", value)
+        steps = list(struct.iter_unpack("@HBBI", ctypes.string_at(address, 8 * count)))
+        if sum(8 * BECOMES[what & 7] for what, *_ in steps) > self._most:
+            raise OSError(errno.ENOMEM, "Cannot allocate memory")
+        self.muted = sum(what == RETURN and value == THROW_AWAY for what, _, _, value in steps)
+
+
+# Into how many instructions of its own a kernel translates one, by the class of the instruction: loads take most.
+BECOMES = {0: 7, 4: 1, 5: 2, 6: 2}
+BEFORE_6_8 = 20480  # bytes
+
+
+def test_an_older_kernel_takes_the_rules_of_all_ports_of_a_host() -> None:
+    kernel = Old(BEFORE_6_8)
+    mute(kernel, [Rule("10.0.0.1", port, False) for port in range(1, MOST_RULES + 1)])
+    assert kernel.muted == MOST_RULES
+
+
+def test_of_more_hosts_than_an_older_kernel_takes_it_takes_some() -> None:
+    kernel = Old(BEFORE_6_8)
+    mute(kernel, [Rule(f"fd00::{n:x}", None, False) for n in range(MOST_RULES)])
+    assert 30 < kernel.muted < MOST_RULES
 
 
 HOST, OWNER = "10.0.0.1", ("10.0.0.1", 5)
