@@ -112,15 +112,20 @@ def _passed() -> list[tuple[str, socket.socket]]:
     """(name, socket) of each socket that systemd holds for us; names as FileDescriptorName= gives them.
 
     It can be called once: it removes systemd's variables, so that no child process takes the sockets for its own.
+    Raises AddressError.
     """
     mine = os.environ.pop("LISTEN_PID", "") == str(os.getpid())
     count, names = os.environ.pop("LISTEN_FDS", ""), os.environ.pop("LISTEN_FDNAMES", "").split(":")
     if not mine or not count.isdigit():
         return []
-    fds = range(FIRST_FD, FIRST_FD + int(count))
-    for fd in fds:
-        os.set_inheritable(fd, False)
-    return [(name, socket.socket(fileno=fd)) for fd, name in zip(fds, names + [""] * int(count), strict=False)]
+    found: list[tuple[str, socket.socket]] = []
+    for n, name in zip(range(int(count)), names + [""] * int(count), strict=False):
+        try:
+            os.set_inheritable(FIRST_FD + n, False)
+            found.append((name, socket.socket(fileno=FIRST_FD + n)))
+        except OSError as error:
+            raise AddressError(f"systemd passed {name!r}, which is no socket: {error.strerror}") from error
+    return found
 
 
 def _by_name(passed: Sequence[tuple[str, socket.socket]]) -> dict[str, socket.socket]:
