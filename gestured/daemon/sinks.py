@@ -16,6 +16,7 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import reason_of
 
 LOOK_UP_S = 5.0  # between two look-ups of a destination that was not found or not reached
+START_S = 0.5  # how long the daemon's start or reload waits for a look-up, which goes on after it
 
 
 class Sink(Protocol):
@@ -46,10 +47,17 @@ class UdpOut(Sink):
         self._metrics, self._throttle = metrics, Throttle()
         self._found: tuple[int, Any] | None = None  # family and address to which no socket is connected yet
         self._socket: socket.socket | None = None
-        self._look_up()
+        self._begin().join(START_S)
+
+    def _begin(self) -> threading.Thread:
+        """Look up the destination in a thread, as a name server that does not answer takes many seconds."""
+        self._due = math.inf
+        thread = threading.Thread(target=self._look_up, name="publish", daemon=True)
+        thread.start()
+        return thread
 
     def _look_up(self) -> None:
-        """Look up the destination, which may block for seconds; any thread may do so."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
         try:
             self._found = look_up(self.destination, socket.SOCK_DGRAM)
         except OSError as error:
@@ -57,12 +65,13 @@ class UdpOut(Sink):
             self._throttle.warn("publish: no such destination", reason, destination=str(self.destination))
         self._due = time.monotonic() + LOOK_UP_S
 
-    def _look_again(self) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
-        self._look_up()
-
     def take_over(self, before: "UdpOut") -> None:
-        """Take over the state of a sink that a reload replaces, if that has the same destination."""
+        """Take over the state of a sink that a reload replaces, if that has the same destination.
+
+        Its socket is used until the destination is looked up.
+        """
+        if before._socket is not None and before.destination == self.destination:
+            self._socket = before._socket.dup()
 
     def close(self) -> None:
         """Close the socket; nothing is sent after it."""
@@ -102,8 +111,7 @@ class UdpOut(Sink):
         """Count a packet that cannot be sent, and look the destination up again, at most every LOOK_UP_S."""
         self._failed(result)
         if time.monotonic() >= self._due:
-            self._due = math.inf
-            threading.Thread(target=self._look_again, name="publish", daemon=True).start()
+            self._begin()
 
     def _failed(self, result: str) -> None:
         self._metrics.sent.add(result)
@@ -153,6 +161,7 @@ class OscSink(UdpOut):
 
     def take_over(self, before: UdpOut) -> None:
         """Take over the provisional events that the sink before has sent, to revoke them if they turn out wrong."""
+        super().take_over(before)
         if isinstance(before, OscSink) and before.destination == self.destination and self.wants:
             self._said, before._said = before._said, {}
 

@@ -67,6 +67,7 @@ class TuioSink(UdpOut):
 
     def take_over(self, before: UdpOut) -> None:
         """Go on with the same fingers and numbers."""
+        super().take_over(before)
         if isinstance(before, TuioSink) and before.destination == self.destination:
             self._sources, self._sessions, self._frames = before._sources, before._sessions, before._frames
             before._sources = {}

@@ -2,6 +2,7 @@
 
 import errno
 import socket
+import threading
 import time
 from typing import Any
 
@@ -42,6 +43,49 @@ def test_a_destination_whose_name_is_not_known_yet_or_was_of_another_host_is_loo
         sink.publish(Status("ok", {}, "tiny", 0.0), 0.0)
     assert OscMessage(udp.recv(9999)).address == "/gestured/status" and metrics.sent.values[result,] > 0
     sink.close()
+
+
+def test_a_name_server_that_does_not_answer_holds_up_neither_a_start_nor_what_goes_on_after_a_reload(
+    udp: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = look_up(Address(*udp.getsockname()), socket.SOCK_DGRAM)
+    answers: dict[str, Any] = {"first": known}
+    asked, answered = threading.Event(), threading.Event()
+
+    def slow(address: Address, kind: int) -> Any:
+        if address.host not in answers:
+            asked.set()
+            assert answered.wait(DEADLINE_S)
+        return known
+
+    monkeypatch.setattr(sinks, "look_up", slow)
+    monkeypatch.setattr(sinks, "START_S", 0.0)
+    metrics = Metrics()
+    status = Status("ok", {}, "tiny", 0.0)
+    late = sinks.OscSink(Address("late", 9001), metrics)
+    assert asked.wait(DEADLINE_S)
+    late.publish(status, 0.0)
+    assert metrics.sent.values == {("unresolved",): 1}
+
+    before = sinks.OscSink(Address("first", 9001), metrics)
+    end = time.monotonic() + DEADLINE_S
+    while ("sent",) not in metrics.sent.values and time.monotonic() < end:
+        before.publish(status, 0.0)
+    del answers["first"]
+    after = sinks.OscSink(Address("first", 9001), metrics)
+    after.take_over(before)
+    before.close()
+    sent = metrics.sent.values["sent",]
+    after.publish(status, 0.0)
+    assert metrics.sent.values["sent",] == sent + 1
+
+    answered.set()
+    while metrics.sent.values["sent",] < sent + 2 and time.monotonic() < end:
+        late.publish(status, 0.0)
+    for _ in range(round(sent) + 2):
+        assert OscMessage(udp.recv(9999)).address == "/gestured/status"
+    late.close()
+    after.close()
 
 
 def test_after_this_machine_got_another_address_a_new_socket_is_taken(
