@@ -110,6 +110,8 @@ class Receiver:
         while self._again is not None and self._clock() < end:
             self.read()
         self._release(math.inf)
+        while self._backlog and self._clock() < end:
+            self._work(self._clock())
 
     def read(self) -> None:
         """Read the packets that wait, and serve as many as fit into a slice of time; the others have a later turn."""
@@ -130,9 +132,7 @@ class Receiver:
             if stamps[-1]:
                 self._empty = arrivals[-1]  # the kernel gives packets in the order in which they came
         elif found:
-            alone, _ = self._bunches.pick(found, [self._arrival(stamp, now) for stamp in stamps])
-            if alone:
-                self._serve(alone, now)
+            self._take(found, [self._arrival(stamp, now) for stamp in stamps], now)
         if not full:
             self._empty = began  # the packets of the next read came later, even if we were stopped since
         self._wall = wall
@@ -145,6 +145,14 @@ class Receiver:
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
 
+    def _take(self, found: list[Packet], arrivals: list[float], now: float) -> None:
+        """Serve few packets. Bunches that were complete before come with them, and may be more than a turn's work."""
+        alone, came = self._bunches.pick(found, arrivals)
+        if sum([len(packet) for packet, _ in alone]) > GROUP_BYTES:
+            self._backlog.add(alone, came)
+        elif alone:
+            self._serve(alone, now)
+
     def _put(self, found: list[Packet], arrivals: list[float], now: float) -> None:
         """Put packets with these arrivals (s) into the backlog, but for those that are held back for their bunch."""
         if self._backlog.flooded(now):  # too much comes already to hold packets back
@@ -155,9 +163,14 @@ class Receiver:
             self._backlog.add(*self._bunches.pick(found, arrivals))
 
     def _release(self, now: float) -> None:
-        """Serve the bunches that are complete, and come back when the next one is."""
+        """Serve the bunches that are complete, as far as they are one turn's work, and come back for the next one."""
+        size = 0
         for bunch in self._bunches.over(now):
-            self._serve(bunch.packets, bunch.arrivals[-1])
+            size += sum([len(packet) for packet, _ in bunch.packets])
+            if size <= GROUP_BYTES:
+                self._serve(bunch.packets, bunch.arrivals[-1])
+            else:
+                self._backlog.add(bunch.packets, [bunch.arrivals[-1]] * len(bunch.packets))
         if self._holding is not None:
             self._holding.cancel()
             self._holding = None

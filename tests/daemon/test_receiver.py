@@ -295,6 +295,19 @@ def test_while_owners_send_full_packets_nobody_else_loses_one(ports: int, cost_s
     assert sum(heard[n] for n in range(30, 145)) >= 0.99 * 4 * 115  # by then it was seen to be a flood
 
 
+@pytest.mark.parametrize(("ports", "rate", "cost_s"), [(130, 600, 0.012), (64, 64, 0.02)])
+def test_owners_that_pause_before_each_full_packet_do_not_stop_the_loop(
+    ports: int, rate: int, cost_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of these packets is a bunch, and a large buffer of the kernel holds many of them."""
+    monkeypatch.setitem(globals(), "BUFFER_BYTES", 8 << 20)
+    full = [(n / rate, bytes(55_000), ("10.0.0.9", n % ports)) for n in range(rate * 10)]
+    machine = Machine([*sensors(4, 145), *full], lambda packet: cost_s if len(packet) > 1000 else 1e-4)
+    turns = [machine.now]
+    run(machine, 10.0, lambda receiver: turns.append(machine.now))
+    assert max(later - before for before, later in pairwise(turns)) < 0.5  # s; systemd's watchdog allows two
+
+
 def test_a_source_of_many_sensors_that_cannot_be_followed_is_heard_all_the_while() -> None:
     """Three hundred sensors behind one address come to more work than there is time, as while they are learned."""
     frames = [(0.01 + n / 15 + k / 4500, b"%3d" % k * 130, ("10.0.0.1", 1)) for n in range(120) for k in range(300)]
