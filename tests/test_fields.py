@@ -43,7 +43,14 @@ LINES = [
     json.loads(line)
     for line in (
         *(to_json(event, 1.8e9) for event in EVENTS),
-        hello_json("0.1", "i", "m", ["one_tap"], {"a": 3}, {"a": {"armed": None, "closed": ["door"], "until": None}}),
+        hello_json(
+            version="0.1",
+            instance="i",
+            model="m",
+            gestures=["one_tap"],
+            sensors={"a": 3},
+            gates={"a": {"armed": None, "closed": ["door"], "until": None}},
+        ),
         gestures_json(["one_tap"]),
         lost_json(3),
     )

@@ -58,27 +58,12 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     return json_line(line)
 
 
-def hello_json(  # noqa: PLR0913 - each is a key of the line
-    version: str,
-    instance: str,
-    model: str,
-    gestures: Sequence[str],
-    sensors: Mapping[str, int],
-    gates: Mapping[str, Mapping[str, Any]],
-) -> bytes:
-    """The first line to a client; by sensor, `sensors` has the last sequence, and `gates` its gates and arming."""
-    return json_line(
-        {
-            "type": "hello",
-            "protocol": 1,
-            "version": version,
-            "instance": instance,
-            "model": model,
-            "gestures": list(gestures),
-            "sensors": dict(sensors),
-            "gates": gates,
-        }
-    )
+def hello_json(**told: object) -> bytes:
+    """The first line to a client: `version`, `instance`, `model` and `gestures`, and by sensor `sensors` and `gates`.
+
+    `sensors` has the last sequence of each, `gates` its gates and arming.
+    """
+    return json_line({"type": "hello", "protocol": 1, **told})
 
 
 def gestures_json(gestures: Sequence[str]) -> bytes:

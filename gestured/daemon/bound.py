@@ -3,7 +3,7 @@
 import os
 import socket
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,7 +64,7 @@ def _from_anywhere(path: Path) -> str:
 
 def bind_all(settings: Settings) -> Bound:
     """Take the sockets that systemd passed and bind the others, all or none. Raises AddressError or SettingsError."""
-    given = _by_name(_passed())
+    given = _passed()
     with ExitStack() as opened:
         for sock in given.values():
             opened.callback(sock.close)
@@ -108,29 +108,22 @@ def _listener(
     return made
 
 
-def _passed() -> list[tuple[str, socket.socket]]:
-    """(name, socket) of each socket that systemd holds for us; names as FileDescriptorName= gives them.
+def _passed() -> dict[str, socket.socket]:
+    """The sockets that systemd holds for us, by their FileDescriptorName=. Raises AddressError for one of no use.
 
     It can be called once: it removes systemd's variables, so that no child process takes the sockets for its own.
-    Raises AddressError.
     """
     mine = os.environ.pop("LISTEN_PID", "") == str(os.getpid())
     count, names = os.environ.pop("LISTEN_FDS", ""), os.environ.pop("LISTEN_FDNAMES", "").split(":")
     if not mine or not count.isdigit():
-        return []
-    found: list[tuple[str, socket.socket]] = []
+        return {}
+    found: dict[str, socket.socket] = {}
     for n, name in zip(range(int(count)), names + [""] * int(count), strict=False):
         try:
             os.set_inheritable(FIRST_FD + n, False)
-            found.append((name, socket.socket(fileno=FIRST_FD + n)))
+            sock = socket.socket(fileno=FIRST_FD + n)
         except OSError as error:
             raise AddressError(f"systemd passed {name!r}, which is no socket: {error.strerror}") from error
-    return found
-
-
-def _by_name(passed: Sequence[tuple[str, socket.socket]]) -> dict[str, socket.socket]:
-    found: dict[str, socket.socket] = {}
-    for name, sock in passed:
         if name not in SOCKET_NAMES:
             raise AddressError(
                 f"systemd passed a socket named {name!r}, expected FileDescriptorName= one of {', '.join(SOCKET_NAMES)}"

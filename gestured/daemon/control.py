@@ -19,16 +19,7 @@ from typing import Any
 from gestured.core.errors import GesturedError
 from gestured.core.messages import json_line
 from gestured.daemon.log import Throttle
-from gestured.daemon.request import (
-    MAX_REQUEST_BYTES,
-    Connection,
-    Peer,
-    Refusal,
-    Reply,
-    Verb,
-    parse_request,
-    peer_of,
-)
+from gestured.daemon.request import MAX_REQUEST_BYTES, Connection, Peer, Refusal, Reply, Verb, parse_request, peer_of
 
 OPERATORS = 16  # connections at a time
 OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out
@@ -145,10 +136,10 @@ class ControlServer:
                 raise Refusal("the recording is being sent to somebody else; ask again when that is over")
             return {"ok": True, **answer}, lines
         except GesturedError as error:
-            return _refused(str(error)), None
+            return {"ok": False, "reason": str(error)}, None
         except Exception:  # a bug in a verb costs this answer alone
             self._throttle.error("a bug in a verb", "control")
-            return _refused("a bug; the daemon's log has the traceback"), None
+            return {"ok": False, "reason": "a bug; the daemon's log has the traceback"}, None
 
     async def _stream(self, connection: Connection, writer: asyncio.StreamWriter, lines: Iterator[bytes]) -> None:
         while not connection.closed:
@@ -188,9 +179,5 @@ async def _drain(writer: asyncio.StreamWriter) -> None:
         raise
 
 
-def _refused(reason: str) -> Reply:
-    return {"ok": False, "reason": reason}
-
-
 def _refusal(reason: str) -> bytes:
-    return json_line(_refused(reason))
+    return json_line({"ok": False, "reason": reason})

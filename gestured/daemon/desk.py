@@ -66,7 +66,10 @@ class Desk:
         if isinstance(event, Touch):
             return  # touch events come up to 60 times a second and are no answers
         if not test:
-            self._metrics.event(event, self._late_s(event))
+            late_s = 0.0  # since the decision; if only the sensor's own clock knows the time of that, we do not
+            if isinstance(event, Gesture | Unknown) and self._hub.scene.clock_of(event.sensor) == "arrival":
+                late_s = time.monotonic() - event.decided
+            self._metrics.event(event, late_s)
             if isinstance(event, Gesture | Unknown):
                 self.models_failed = False
             elif isinstance(event, Cancelled) and event.reason == "model":
@@ -76,12 +79,6 @@ class Desk:
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)
             log.debug(messages.event_type(event), sensor=event.sensor, id=getattr(event, "id", None), gesture=name)
-
-    def _late_s(self, event: Event) -> float:
-        """How long ago an answer was decided, in s; 0 if only the sensor's own clock knows the time of the decision."""
-        if isinstance(event, Gesture | Unknown) and self._hub.scene.clock_of(event.sensor) == "arrival":
-            return time.monotonic() - event.decided
-        return 0.0
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count packets that were dropped; log the reason at a bounded rate."""

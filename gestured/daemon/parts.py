@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gestured.core.beside.reading import Reading
+from gestured.core.events import Gate
 from gestured.core.hub import Hub
 from gestured.daemon.asked import Asked
 from gestured.daemon.bound import Bound
@@ -89,12 +90,18 @@ class Parts:
     def listening(self) -> dict[str, dict[str, Any]]:
         """By sensor that has closed gates or arming, their state; `until` is in s since the Unix epoch."""
         now = time.monotonic()
-        epoch, gates = time.time() - now, self.hub.listening(now)
-        until = {gate.sensor: None if gate.until is None else gate.until + epoch for gate in gates}
-        return {g.sensor: {"armed": g.armed, "closed": g.closed, "until": until[g.sensor]} for g in gates}
+        epoch = time.time() - now
+        return {gate.sensor: heeds(gate, epoch) for gate in self.hub.listening(now)}
 
     def awaiting_restart(self) -> list[str]:
         """Settings that a reload has read with another value, but that only a restart puts to use."""
         new, old = self.settings, self._started_with
         changed = [key for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
         return list(dict.fromkeys(TITLES.get(key, key) for key in changed))
+
+
+def heeds(gate: Gate | None, epoch: float) -> dict[str, Any]:
+    """What a sensor heeds: its closed gates and arming; None has neither. `until` is in s since the Unix epoch."""
+    if gate is None:
+        return {"armed": None, "closed": (), "until": None}
+    return {"armed": gate.armed, "closed": gate.closed, "until": None if gate.until is None else gate.until + epoch}

@@ -84,8 +84,9 @@ class Service:
     def _hello(self) -> bytes:
         """The first line that a client is sent."""
         parts = self.parts
-        names = parts.ladder.active, parts.gestures, parts.hub.sequences(), parts.listening()
-        return messages.hello_json(__version__, parts.instance, *names)
+        who = {"version": __version__, "instance": parts.instance, "model": parts.ladder.active}
+        sensors, gates = parts.hub.sequences(), parts.listening()
+        return messages.hello_json(**who, gestures=parts.gestures, sensors=sensors, gates=gates)
 
     def _known(self) -> dict[str, Sequence[str]]:
         """The types, gestures and zones that a client may name in a subscription."""

@@ -9,8 +9,7 @@ from gestured import __version__
 from gestured.core.address import Address, Grid
 from gestured.core.beside.reading import SILENT, Reading
 from gestured.daemon.metrics import Counter
-from gestured.daemon.parts import Parts
-from gestured.daemon.settings import Settings
+from gestured.daemon.parts import Parts, heeds
 from gestured.daemon.sockets import kernel_drops
 
 HANG_S = 2.0  # the loop counts as hanging after so long without a beat
@@ -19,7 +18,7 @@ HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 def status(parts: Parts) -> dict[str, Any]:
     """The answer to the verb `status`; durations are in seconds, `time` and `started` in s since the Unix epoch."""
     now, metrics, ladder, shift = time.monotonic(), parts.metrics, parts.ladder, parts.desk.shift
-    epoch, readings = time.time() - now, parts.readings()
+    epoch, readings, scene = time.time() - now, parts.readings(), parts.hub.scene
     states = {name: reading.state for name, reading in readings.items()}
     ready = _ready(parts, states)
     return {
@@ -41,11 +40,11 @@ def status(parts: Parts) -> dict[str, Any]:
             "file": ladder.source,
             "version": ladder.model.metadata.version,
             "sha256": ladder.model.sha256,
-            "gestures": list(parts.hub.scene.gestures),
+            "gestures": list(scene.gestures),
         },
         "own": parts.own.report(),
         "sensors": {
-            name: {**sensor(reading, now, epoch), "zones": _zones(parts.settings, name)}
+            name: {**sensor(reading, now, epoch), "zones": {k: zone.at for k, zone in scene.setup(name).zones.items()}}
             for name, reading in readings.items()
         },
         "gates": sorted(parts.hub.gates.of(None)),
@@ -111,7 +110,6 @@ def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
 
     Only ages are rounded: rounding costs more than all else here, and /metrics shows the same figures.
     """
-    gate = reading.gate
     shown = {
         "state": reading.state,
         "reason": reading.reason,
@@ -120,9 +118,7 @@ def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
         "bad_taxels": reading.bad_taxels,
         "drift": reading.drift,
         "grid": str(Grid(*reading.grid)),
-        "armed": None if gate is None else gate.armed,
-        "closed": () if gate is None else gate.closed,
-        "until": None if gate is None or gate.until is None else gate.until + epoch,
+        **heeds(reading.gate, epoch),
     }
     if reading.source is not None:
         shown |= {
@@ -136,12 +132,6 @@ def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
             "gestures": reading.sequence,
         }
     return shown
-
-
-def _zones(settings: Settings, name: str) -> dict[str, tuple[float, ...]]:
-    """Left, bottom, right and top edge of each zone of a sensor, in fractions of it."""
-    own = settings.sensors.get(name)
-    return {} if own is None else {zone: one.at for zone, one in own.zones.items()}
 
 
 def _ready(parts: Parts, states: Mapping[str, str]) -> dict[str, Any]:

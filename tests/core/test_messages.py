@@ -80,7 +80,8 @@ def test_a_gesture_looks_as_the_contract_says() -> None:
     assert messages.to_json(status, 1000.0) == (
         b'{"type":"status","state":"ok","sensors":{"armrest":"ok"},"model":"cnn_lstm","time":1234.5,"gates":{}}\n'
     )
-    assert messages.hello_json("0.1", "x", "m", ("a", "b"), {"armrest": 17}, {}) == (
+    hello = {"version": "0.1", "instance": "x", "model": "m", "gestures": ("a", "b"), "sensors": {"armrest": 17}}
+    assert messages.hello_json(**hello, gates={}) == (
         b'{"type":"hello","protocol":1,"version":"0.1","instance":"x","model":"m","gestures":["a","b"],'
         b'"sensors":{"armrest":17},"gates":{}}\n'
     )

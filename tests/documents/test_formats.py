@@ -70,7 +70,12 @@ def test_lines_of_every_kind_are_valid(valid: Any):
     valid(
         json.loads(
             messages.hello_json(
-                "1", "x", "m", ["one_tap"], {"a": 0}, {"a": {"armed": True, "closed": (), "until": 2.0}}
+                version="1",
+                instance="x",
+                model="m",
+                gestures=["one_tap"],
+                sensors={"a": 0},
+                gates={"a": {"armed": True, "closed": (), "until": 2.0}},
             )
         )
     )
