@@ -28,12 +28,11 @@ def _is_texts(value: Any) -> bool:
     return isinstance(value, list) and all(map(_is(str), value))
 
 
-def _is_place(value: Any) -> bool:
-    return isinstance(value, dict) and _is_number(value.get("x")) and _is_number(value.get("y"))
-
-
-def _is_where(value: Any) -> bool:
-    return isinstance(value, dict) and all(_KINDS[kind][0](value.get(name)) for name, kind in _WHERE.items())
+def _like(what: type) -> Callable[[Any], bool]:
+    kinds = get_type_hints(what)
+    return lambda value: (
+        isinstance(value, dict) and all(_KINDS[kind][0](value.get(name)) for name, kind in kinds.items())
+    )
 
 
 def _is_gates(value: Any) -> bool:
@@ -46,7 +45,6 @@ def _is_gates(value: Any) -> bool:
     )
 
 
-_WHERE = get_type_hints(Where)
 GATES = Mapping[str, Mapping[str, Any]]
 # The annotation of a field -> whether a value fits it, and the words for such a value.
 _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
@@ -57,8 +55,8 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     str | None: (_is(str, type(None)), "a text or null"),
     bool | None: (_is(bool, type(None)), "true, false or null"),
     float | None: (lambda value: value is None or _is_number(value), "a number or null"),
-    Place: (_is_place, "an object with x and y"),
-    Where | None: (_is_where, "an object with start, end, way, pressure, snr, contacts, bridged and zone"),
+    Place: (_like(Place), "an object with x and y"),
+    Where | None: (_like(Where), "an object with start, end, way, pressure, snr, contacts, bridged and zone"),
     list[str]: (_is_texts, "a list of texts"),
     tuple[str, ...]: (_is_texts, "a list of texts"),
     Mapping[str, float]: (_object(_is_number), "an object of numbers"),

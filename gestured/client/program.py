@@ -21,6 +21,11 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter} | options)
 
+    def runs(self, run: Callable[[argparse.Namespace], int], json: str) -> None:
+        """Let a subcommand run `run`, and take `--json`, which does what `json` says."""
+        self.add_argument("--json", action="store_true", help=json)
+        self.set_defaults(run=run)
+
 
 # The object to which subcommands add themselves; argparse has no public name for its type.
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"

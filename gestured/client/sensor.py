@@ -6,7 +6,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from gestured.client import osc_out
 from gestured.client.address import look_up
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
-from gestured.core.frames import Frame, Touch
+from gestured.core.frames import Frame
 
 BLOBS: dict[str, np.dtype[Any]] = {
     "float32": np.dtype(">f4"),
@@ -39,7 +39,10 @@ class Form:
         pressure = self._pressure(frame.values, None if self.plain else counter)
         if self.plain:
             return pressure
-        return osc_out.dated(moment, pressure, self._trajectory(frame.touches))
+        args = [value for touch in frame.touches[:3] for value in (touch.id, touch.x, touch.y)]
+        types = "iff" * (len(args) // 3)
+        head = osc_out.head(f"/{self.sensor}/trajectory", types)
+        return osc_out.dated(moment, pressure, head + struct.pack(">" + types, *args))
 
     def _pressure(self, values: NDArray[np.generic], counter: int | None) -> bytes:
         address = f"/{self.sensor}/pressure"
@@ -54,11 +57,6 @@ class Form:
             flat = np.clip(np.rint(flat), 0, np.iinfo(dtype).max)
         blob: bytes = osc_out.message(address, types + "b", [*args, flat.astype(dtype).tobytes()]).dgram
         return blob
-
-    def _trajectory(self, touches: Sequence[Touch]) -> bytes:
-        args = [value for touch in touches[:3] for value in (touch.id, touch.x, touch.y)]
-        types = "iff" * (len(args) // 3)
-        return osc_out.head(f"/{self.sensor}/trajectory", types) + struct.pack(">" + types, *args)
 
 
 def connected(to: tuple[str, int]) -> socket.socket:

@@ -21,8 +21,7 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl check cnn_lstm\n  gesturectl check --json my_model.onnx",
     )
     parser.add_argument("model", metavar="MODEL", help="a path, or the name of a shipped model")
-    parser.add_argument("--json", action="store_true", help="print what is known about it as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print what is known about it as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

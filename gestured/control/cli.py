@@ -8,25 +8,12 @@ from importlib import import_module
 
 from gestured.client import program
 
-# (module, the subcommands that it adds): only the module of the subcommand that runs is imported.
-SUBCOMMANDS = (
-    ("status", ("status",)),
-    ("listen", ("listen",)),
-    ("view", ("view",)),
-    ("pad", ("pad",)),
-    ("doctor", ("doctor",)),
-    ("sniff", ("sniff",)),
-    ("operate", ("reload", "recalibrate", "emit", "inhibit", "allow", "gestures", "forget")),
-    ("enrol", ("enrol",)),
-    ("record", ("record",)),
-    ("flag", ("flag",)),
-    ("replay", ("replay",)),
-    ("export", ("export",)),
-    ("tune", ("tune",)),
-    ("simulate", ("simulate",)),
-    ("check", ("check",)),
-    ("demo", ("demo",)),
-)
+# By module, the subcommands that it adds: only the module of the subcommand that runs is imported.
+SUBCOMMANDS = {
+    **{name: (name,) for name in ("status", "listen", "view", "pad", "doctor", "sniff")},
+    "operate": ("reload", "recalibrate", "emit", "inhibit", "allow", "gestures", "forget"),
+    **{name: (name,) for name in ("enrol", "record", "flag", "replay", "export", "tune", "simulate", "check", "demo")},
+}
 ENDLESS = {"listen", "view", "pad", "simulate", "demo"}  # Ctrl-C is how they end; what others do, it cuts short
 
 
@@ -38,8 +25,8 @@ def parser(argv: Sequence[str] = ()) -> program.Parser:
         description="The operator's client of gestured.",
         epilog="example: gesturectl listen --gesture swipe_left",
     )
-    asked = [row for row in SUBCOMMANDS if argv and argv[0] in row[1]]
-    for module, _ in asked or SUBCOMMANDS:
+    asked = [module for module, names in SUBCOMMANDS.items() if argv and argv[0] in names]
+    for module in asked or SUBCOMMANDS:
         import_module(f"gestured.control.{module}").add(commands)
     return top
 

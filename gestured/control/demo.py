@@ -52,8 +52,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)")
     parser.add_argument("--seconds", type=number(5, 600), default=60.0, metavar="S", help="how long (default: 60)")
     add_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print outcomes and summary as JSON lines")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print outcomes and summary as JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -43,8 +43,7 @@ def add(commands: Commands) -> None:
         epilog="example:\n  gesturectl doctor",
     )
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON lines")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the findings as JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:

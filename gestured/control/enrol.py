@@ -30,8 +30,7 @@ def add(commands: Commands) -> None:
     text = f"how often, 1 to {EXAMPLES} (default: {USUAL})"
     parser.add_argument("--examples", type=number(1, EXAMPLES, whole=True), default=USUAL, metavar="N", help=text)
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print one JSON object a line")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -34,8 +34,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
     parser.add_argument("out", type=npz, metavar="OUT", help="the .npz to write")
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
-    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print what was written as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

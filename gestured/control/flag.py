@@ -29,8 +29,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: flag-DATE-TIME.mcap")
     parser.add_argument("--note", default="", metavar="TEXT", help="what was wrong; kept with it")
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print what was kept as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print what was kept as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

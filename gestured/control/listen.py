@@ -38,8 +38,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--zone", action="append", metavar="NAME", help="only what began in this zone; may be repeated")
     parser.add_argument("--count", type=number(1, 10**9, whole=True), metavar="N", help="end after N events")
     parser.add_argument("--reconnect", action="store_true", help="wait for a daemon that is not there (any more)")
-    parser.add_argument("--json", action="store_true", help="print the daemon's own lines, the hello among them")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the daemon's own lines, the hello among them")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
                 if args.json:
                     _repeat(line, event)
                 elif kind == "hello":
-                    told(_greeting(event))
+                    names = ", ".join(event["sensors"]) or "none yet"
+                    told(f"gestured {event['version']}, model {event['model']}, sensors: {names}")
                 elif kind == "gestures":
                     told(f"gestures: {', '.join(event['gestures'])}")
                 else:
@@ -116,12 +116,6 @@ def went(where: dict[str, Any]) -> str:
     start, end = (f"{where[key]['x']:.2f},{where[key]['y']:.2f}" for key in ("start", "end"))
     zone = f" ({where['zone']})" if where.get("zone") else ""
     return f"from {start}{zone} to {end}" if where["way"] else f"at {start}{zone}"
-
-
-def _greeting(hello: dict[str, Any]) -> str:
-    """The daemon's hello, in words."""
-    names = ", ".join(hello["sensors"]) or "none yet"
-    return f"gestured {hello['version']}, model {hello['model']}, sensors: {names}"
 
 
 def _repeat(line: str, event: dict[str, Any]) -> None:

@@ -94,8 +94,7 @@ def _add_gates(commands: Commands) -> None:
 def _asks(parser: Parser, verb: str, *parameters: str) -> None:
     """Let a subcommand ask the daemon the `verb`, with those of its arguments that `parameters` names."""
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the daemon's answer")
-    parser.set_defaults(run=partial(_ask, verb, parameters))
+    parser.runs(partial(_ask, verb, parameters), "print the daemon's answer")
 
 
 def _ask(verb: str, parameters: tuple[str, ...], args: argparse.Namespace) -> int:

@@ -37,8 +37,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--rate", type=number(5, 200), default=15.0, metavar="HZ", help="frames a second (default: 15)")
     parser.add_argument("--model", default="cnn_lstm", help="of its own daemon (default: cnn_lstm)")
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the address as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the address as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -41,8 +41,7 @@ def add(commands: Commands) -> None:
     most = number(1, 1 << 20, whole=True)
     parser.add_argument("--max-mib", type=most, default=1024, metavar="N", help="end at this size (default: 1024)")
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the summary as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -66,8 +66,7 @@ def add(commands: Commands) -> None:
     )
     text = "the sensor's name, for an .npz"
     parser.add_argument("--sensor", type=sensor_name, default="recording", metavar="NAME", help=text)
-    parser.add_argument("--json", action="store_true", help="print events, or differences, as JSON lines")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print events, or differences, as JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ import argparse
 import sys
 from collections.abc import Iterator
 from itertools import chain
-from typing import Any
 
 from gestured.client.lines import read_ahead
 from gestured.client.program import Commands
@@ -47,8 +46,7 @@ def add(commands: Commands) -> None:
     add_arguments(parser)
     text = "send a blob instead of floats (default: uint16)"
     parser.add_argument("--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help=text)
-    parser.add_argument("--json", action="store_true", help="print what is performed as JSON lines")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print what is performed as JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,21 +84,11 @@ def _telling(
             raise GesturedError(f"nobody listens on {sensor.to}: start gestured, or name its address with --to")
         while left and start + left[0].offset_s < frame.t:
             event = left.pop(0)
-            _tell(event, sensor.moment(start), sensor.form.sensor, as_json)
+            performed = {
+                "type": "performed", "sensor": sensor.form.sensor, "gesture": event.label, "kind": event.kind,
+                "onset": sensor.moment(start + event.onset_s), "offset": sensor.moment(start + event.offset_s),
+                "speed": event.speed, "participant": event.participant,
+            }  # fmt: skip
+            name = event.label if event.label == event.kind else f"no gesture ({event.kind.replace('_', ' ')})"
+            tell(as_json, performed, f"performed {name}, {event.speed}, {event.offset_s - event.onset_s:.2f} s")
         yield counter, frame
-
-
-def _tell(event: Act, start: float, sensor: str, as_json: bool) -> None:
-    performed: dict[str, Any] = {
-        "type": "performed",
-        "sensor": sensor,
-        "gesture": event.label,
-        "kind": event.kind,
-        "onset": start + event.onset_s,
-        "offset": start + event.offset_s,
-        "speed": event.speed,
-        "participant": event.participant,
-    }
-    name = event.label if event.label == event.kind else f"no gesture ({event.kind.replace('_', ' ')})"
-    words = f"performed {name}, {event.speed}, {event.offset_s - event.onset_s:.2f} s"
-    tell(as_json, performed, words)

@@ -43,8 +43,7 @@ def add(commands: Commands) -> None:
     text = "listen at this UDP address itself; no daemon may have it"
     parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help=text)
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print what was seen as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print what was seen as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

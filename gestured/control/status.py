@@ -40,8 +40,7 @@ def add(commands: Commands) -> None:
     text = "show each daemon on this machine, a line each; exit status 1 if one is not ready"
     parser.add_argument("--all", action="store_true", help=text)
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print all that is known as JSON, one line each time")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print all that is known as JSON, one line each time")
 
 
 def run(args: argparse.Namespace) -> int:

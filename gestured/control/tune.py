@@ -46,8 +46,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="shipped, or a file (default: cnn_lstm)")
     text = "how many false gestures an hour there may be at most"
     parser.add_argument("--budget", type=number(0.001, 100), metavar="PER_HOUR", help=text)
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

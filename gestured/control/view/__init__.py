@@ -37,8 +37,7 @@ def add(commands: Commands) -> None:
         help="folder for flagged recordings, made where there is none (default: .)",
     )
     add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the address as JSON")
-    parser.set_defaults(run=run)
+    parser.runs(run, "print the address as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
