@@ -48,7 +48,8 @@ def rate(counts: ArrayLike, hours: ArrayLike) -> tuple[float, float]:
     if not found.any():
         return 0.0, RULE_OF_THREE / float(spent.sum())
     mean = float(found.sum() / spent.sum())
-    wide = _half_width(found, spent) if len(found) > 1 else _normal() / math.sqrt(found.sum())
+    chance = NormalDist().inv_cdf((1 + CONFIDENCE_LEVEL) / 2) / math.sqrt(found.sum())
+    wide = _half_width(found, spent) if len(found) > 1 else chance
     return mean * math.exp(-min(wide, 50.0)), mean * math.exp(min(wide, 50.0))
 
 
@@ -64,10 +65,6 @@ def _half_width(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
     left = part - part.sum() / whole.sum() * whole
     spread = math.sqrt(people / (people - 1) * float((left**2).sum())) / float(part.sum())
     return student(people - 1) * spread
-
-
-def _normal() -> float:
-    return NormalDist().inv_cdf((1 + CONFIDENCE_LEVEL) / 2)
 
 
 def student(degrees: int) -> float:

@@ -210,20 +210,17 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
     if data.real is None:
         return Trained(start, None)
     key += data.real.digest()[:6]
+
+    def learned(file: str, real: Samples, title: str) -> nn.ModuleDict:
+        return kept_nets(cache / f"{file}-{key}.npz", lambda: finetune(start, data.teach, real, plan.fit, title))
+
     held_out = {name: torch.zeros(len(data.real), len(CLASSES)) for name in start}
     apart: list[nn.ModuleDict] = []
     for k, held in enumerate(folds(data.real)):
-        seen, path = data.real.take(~held), cache / f"fold{k}-{key}.npz"
-        apart.append(_kept(path, start, data, seen, plan, f"fold {k + 1}/{FOLDS}"))
+        apart.append(learned(f"fold{k}", data.real.take(~held), f"fold {k + 1}/{FOLDS}"))
         for name, found in logits(apart[-1], data.real.take(held)).items():
             held_out[name][torch.from_numpy(held)] = found
-    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart, start)
-
-
-def _kept(
-    path: Path, start: nn.ModuleDict, data: TrainingData, real: Samples, plan: TrainingPlan, title: str
-) -> nn.ModuleDict:
-    return kept_nets(path, lambda: finetune(start, data.teach, real, plan.fit, title))
+    return Trained(learned("final", data.real, "final"), held_out, apart, start)
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,7 +119,9 @@ class Ladder:
             except Exception as error:  # whatever makes a rung fail, the next one answers
                 self._put_aside(rung, str(error) or type(error).__name__)
                 continue
-            self._timed(rung, took)
+            rung.slow = rung.slow + 1 if took > self._slow_s else 0
+            if rung.slow >= SLOW_RUNS:
+                self._put_aside(rung, f"{SLOW_RUNS} runs in a row took more than {self._slow_s:g} s")
             if rung is not self._active:
                 self.report(f"{rung.name} answers now")
                 self._active = rung
@@ -184,11 +186,6 @@ class Ladder:
         self.failures += 1
         until = f"for {RETRY_S:g} s" if rung.refused is None else "until a reload"
         self.report(f"{rung.name} is put aside {until}: {reason}")
-
-    def _timed(self, rung: Rung, took: float) -> None:
-        rung.slow = rung.slow + 1 if took > self._slow_s else 0
-        if rung.slow >= SLOW_RUNS:
-            self._put_aside(rung, f"{SLOW_RUNS} runs in a row took more than {self._slow_s:g} s")
 
 
 def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:

@@ -23,7 +23,7 @@ from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.weights import Base
 from gestured.lab.decide import refitted
 from gestured.lab.early import Foretold
-from gestured.lab.everyday.hours import Least, points_of
+from gestured.lab.everyday.hours import Least, points_of, thresholds
 from gestured.lab.intervals import interval
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples
@@ -56,8 +56,7 @@ class Answers:
 
     def shares(self, least: Least) -> "Shares":
         """The shares, with answers published from a confidence of `least` on."""
-        each = [least[name] if isinstance(least, Mapping) else least for name in GESTURES]
-        published = self.confidence >= np.array(each)[self.named]
+        published = self.confidence >= thresholds(least)[self.named]
         known, others = self.known, ~self.known
         right, wrong = published & self.right, published & known & ~self.right
         low_high = [

@@ -28,8 +28,8 @@ from gestured.lab import decide
 from gestured.lab.adapt.learning import Simulated, opinions
 from gestured.lab.adapt.material import FEWEST, GROUPS, Own, dealt, held_out
 from gestured.lab.adapt.weights import Base
-from gestured.lab.early import Foretold
-from gestured.lab.everyday.hours import Least, points_of
+from gestured.lab.early import Foretold, published
+from gestured.lab.everyday.hours import points_of, thresholds
 from gestured.lab.everyday.stretches import HOUR_S, Stretch, recorded
 from gestured.lab.fit import targets
 from gestured.lab.intervals import interval, rate
@@ -109,11 +109,8 @@ class Cost(NamedTuple):
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON values."""
         named = {"false_per_hour": self.false, "right": self.right, "wrong": self.wrong}
-        return {name: dict(zip(("is", "low", "high"), map(_rounded, of), strict=True)) for name, of in named.items()}
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), 4)
+        rounded = {name: [round(float(value), 4) for value in of] for name, of in named.items()}
+        return {name: dict(zip(("is", "low", "high"), of, strict=True)) for name, of in rounded.items()}
 
 
 class _Heard:
@@ -221,21 +218,15 @@ def quieter(base: Base, own: Own, lived: Lived, takes: Simulated) -> Quieter:
     hours = float(lived.hours.sum())
     points = operating_points(new, heard.samples, own.performed, hours, own.performed / AN_HOUR / hours)
     asked = nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory})
-    least = np.array([points[USUAL]["thresholds"][name] for name in GESTURES])
+    least = thresholds(points[USUAL]["thresholds"])
     provisional = Foretold.sessions([(asked, takes.check), (asked, takes.early)]).rule("net", judged, least)
-    usual = decide.confidence(said) >= _least(said, points_of(base.model)[USUAL])
+    usual = published(said, thresholds(points_of(base.model)[USUAL])) >= 0
     as_many = int((heard.right(said) & usual).sum())
     return Quieter(
         judged, base.model.threshold, points, provisional, lived, heard.unit,
         heard.samples.labels != NONE, decide.confidence(new).astype(np.float64),
         heard.cost(said, usual), heard.alike(said, as_many), heard.alike(new, as_many),
     )  # fmt: skip
-
-
-def _least(answers: decide.Answers, least: Least) -> NDArray[np.float64]:
-    """(N,) the confidence from which each answer is published."""
-    of = np.array([least[name] if isinstance(least, Mapping) else least for name in GESTURES])
-    return np.asarray(of[answers[0].argmax(axis=1)])
 
 
 def _lacking(own: Samples, takes: Samples) -> Samples:

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gestured.core.events import Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Decided
@@ -20,6 +21,7 @@ from gestured.lab.everyday.stretches import HEARD, HOUR_S, WOKEN, Stretch
 from gestured.lab.intervals import rate
 from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed, Said, verdicts, whose
+from gestured.simulator import GESTURES
 
 TAPS = (ONE_TAP, DOUBLE_TAP)
 LONGEST_STEP_S = 1.0  # s, the most of a step between frames that counts as deaf; in a longer one the sensor was silent
@@ -207,6 +209,11 @@ def shares(became: Mapping[str, int]) -> dict[str, Any]:
     total = sum(became.get(how, 0) for how in ("right", "wrong", "missed"))
     parts = {how: round(became.get(how, 0) / total, 4) if total else None for how in ("right", "wrong", "missed")}
     return {"meant": total, **parts}
+
+
+def thresholds(least: Least) -> NDArray[np.float64]:
+    """(G,) the confidence from which each of the simulator's gestures is published."""
+    return np.array([least[name] if isinstance(least, Mapping) else least for name in GESTURES])
 
 
 def points_of(model: Model) -> dict[str, Least]:

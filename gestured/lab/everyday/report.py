@@ -97,16 +97,13 @@ def _curves(found: Figures) -> Table:
         (name, [of.get(name) for of in points.values()]) for name in names
     ]
     for level in SHOWN:
-        sides.append((f"threshold {level:g}", [_at(rows, level) for rows in curves.values()]))
+        at_level = [next(row for row in rows if row["threshold"] == level) for rows in curves.values()]
+        sides.append((f"threshold {level:g}", at_level))
     rows: list[tuple[Value, ...]] = [(name, *(cell for row in each for cell in _cells(row))) for name, each in sides]
     head = ("at", *(words for name in curves for words in (f"{name}: false an hour", "missed or wrong")))
     lone = ", ".join(name for name, of in points.items() if list(of) == [USUAL])
     notes = [f"Without operating points, but for one threshold, shown as {USUAL}: {lone}."] if lone else []
     return Table("Missed against false", head, rows, tuple(notes))
-
-
-def _at(rows: Sequence[Mapping[str, float | None]], level: float) -> Mapping[str, float | None]:
-    return next(row for row in rows if row["threshold"] == level)
 
 
 def _cells(row: Mapping[str, float | None] | None) -> tuple[Value, Value]:

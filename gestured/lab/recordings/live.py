@@ -11,7 +11,7 @@ from gestured.client.address import look_up
 from gestured.client.say import shown
 from gestured.core.address import Address
 from gestured.core.beside.reading import Reading
-from gestured.core.classifier import Classifier, Scores
+from gestured.core.classifier import Classifier
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Event, Onset, Release, Status
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
@@ -167,18 +167,8 @@ class LiveSensor:
             trouble = WHY.get(reasons[0], reasons[0]) if reasons else "not let go"
         start = min(max(first - KEPT_IDLE_S, self._before), first)
         frames = tuple(frame for frame in self._frames if frame.t >= start)
-        marks = np.searchsorted([frame.t for frame in frames], [first, last])
-        return Captured(
-            frames,
-            int(marks[0]),
-            min(int(marks[1]), len(frames) - 1),
-            self._reading.noise if self._reading else 0.0,
-            trouble,
-            *self._looks(decided[0].scores if len(decided) == 1 else None),
-        )
-
-    def _looks(self, scores: Scores | None) -> tuple[str, float]:
-        """The gesture that a take looks like, and how surely."""
-        if scores is None or len(scores.values) != len(self._gestures):
-            return "", 0.0
-        return self._gestures[int(scores.values.argmax())], scores.confidence
+        begin, end = np.searchsorted([frame.t for frame in frames], [first, last]).tolist()
+        noise, looks, sure = self._reading.noise if self._reading else 0.0, "", 0.0
+        if len(decided) == 1 and len((scores := decided[0].scores).values) == len(self._gestures):
+            looks, sure = self._gestures[int(scores.values.argmax())], scores.confidence
+        return Captured(frames, begin, min(end, len(frames) - 1), noise, trouble, looks, sure)

@@ -44,7 +44,8 @@ class Captured:
     def peak(self) -> float:
         """Counts of the strongest taxel above what it shows untouched."""
         values = self.values()
-        return float((values - _idle(values, self.onset))[self.onset : self.release + 1].max())
+        idle = np.median(values[: max(self.onset - 1, 1)], axis=0)
+        return float((values - idle)[self.onset : self.release + 1].max())
 
 
 def faults(take: Captured, gesture: str) -> list[str]:
@@ -90,7 +91,3 @@ def saturated(contact: NDArray[np.floating]) -> bool:
         return False
     at_top = (contact == top).sum(axis=(1, 2))
     return bool((at_top > 0).sum() >= max(RAIL_FRAMES, RAIL_SHARE * len(contact)) or at_top.max() >= RAIL_TAXELS)
-
-
-def _idle(values: NDArray[np.float64], onset: int) -> NDArray[np.float64]:
-    return np.asarray(np.median(values[: max(onset - 1, 1)], axis=0))

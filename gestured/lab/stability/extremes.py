@@ -143,7 +143,8 @@ def streams(quick: bool) -> Iterator[Case]:
         frames[touched, taxel] += SIGNAL
         yield Case("one active taxel", Series(base.times, frames.reshape(base.frames.shape)))
     for value in (4095.0, 65535.0, FINITE[0]):
-        yield Case("all saturated, all equal", _with(base, touched, value))
+        full = np.where(touched[:, None, None], value, base.frames)
+        yield Case("all saturated, all equal", Series(base.times, full))
     for value in (1.0, 1e3, 1e30):
         signs = np.where(np.indices(base.frames.shape).sum(axis=0) % 2, value, -value)
         yield Case("alternating extremes", Series(base.times, signs))
@@ -181,10 +182,6 @@ def _steps_and_spikes() -> Iterator[Case]:
                 frames[int(moment * 15)].reshape(-1)[:taxels] = size
                 after = tuple(t for t in at if t > moment + 8.0)
                 yield Case("one spike of 1e6 to 1e30, 8 s later", Series(long.times, frames), after)
-
-
-def _with(base: Series, touched: Array, value: float) -> Series:
-    return Series(base.times, np.where(touched[:, None, None], value, base.frames))
 
 
 def _held(count: int) -> Series:

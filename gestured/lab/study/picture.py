@@ -58,12 +58,11 @@ def points(study: Study) -> Study:
         "machine": study["machine"],
         "methods": {name: {"title": of["title"]} for name, of in study["methods"].items() if name in timed},
         "run_time": study["run_time"],
-        **{name: [_false(row) for row in study[name]] for name in ("online", "online_shipped")},
+        **{
+            name: [{key: row[key] for key in ("method", "false_per_minute")} for row in study[name]]
+            for name in ("online", "online_shipped")
+        },
     }
-
-
-def _false(row: Row) -> Row:
-    return {name: row[name] for name in ("method", "false_per_minute")}
 
 
 def operating_points(study: Study) -> Figure:

@@ -129,11 +129,12 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
     count = len(GESTURES)
     confusion = np.zeros((count, count), int)
     np.add.at(confusion, (result["truth"], result["predicted"]), 1)
+    spread = float(np.std(result["shares"], ddof=1)) if len(result["shares"]) > 1 else 0.0  # over seeds
     return {
         "method": cell.method, "settings": cell.settings, "augmentation": cell.augmentation,
         "protocol": cell.protocol, "data": cell.data,
         "n": len(result["truth"]) // len(result["shares"]), **summary(right(result), result["person"]),
-        "seeds": len(result["shares"]), "spread": round(_spread(result["shares"]), 4),
+        "seeds": len(result["shares"]), "spread": round(spread, 4),
         "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
         "confusion": confusion.tolist(),
     }  # fmt: skip
@@ -156,11 +157,6 @@ def by_trial(found: Mapping[Cell, Result], trials: Sequence[Trial]) -> list[dict
                 "inclination": {str(n): _mean(good[inclinations[source] == n]) for n in INCLINATIONS},
             })  # fmt: skip
     return out
-
-
-def _spread(shares: Sequence[float]) -> float:
-    """The standard deviation over seeds; 0 for one seed."""
-    return float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0
 
 
 def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
