@@ -37,20 +37,18 @@ def add(commands: Commands) -> None:
         "  gestured-bridge mqtt --broker broker.example --tls --gates /run/gestured/gates.sock",
     )
     text = f"the broker (port {PLAIN_PORT}, with TLS {TLS_PORT}, unless named)"
-    parser.add_argument("--broker", required=True, metavar="HOST[:PORT]", help=text)
-    parser.add_argument("--host", metavar="NAME", help="name of this machine in topics (default: its hostname)")
+    parser.takes("--broker", "HOST[:PORT]", text, required=True)
+    parser.takes("--host", "NAME", "name of this machine in topics (default: its hostname)")
     add_filters(parser)
     parser.add_argument("--tls", action="store_true", help="encrypt, and check the broker's certificate")
-    parser.add_argument("--ca", type=Path, metavar="FILE", help="certificates to trust instead of the system's (PEM)")
-    parser.add_argument("--cert", type=Path, metavar="FILE", help="our own certificate and key (PEM)")
+    parser.takes("--ca", "FILE", "certificates to trust instead of the system's (PEM)", type=Path)
+    parser.takes("--cert", "FILE", "our own certificate and key (PEM)", type=Path)
     text = "discovery prefix of Home Assistant (default: homeassistant)"
-    parser.add_argument("--discovery", default="homeassistant", metavar="PREFIX", help=text)
+    parser.takes("--discovery", "PREFIX", text, default="homeassistant")
     parser.add_argument("--no-discovery", action="store_true", help="publish nothing for Home Assistant")
     text = "the daemon's socket for bridges: have the broker close and open a gate (default: it can do nothing)"
-    parser.add_argument("--gates", type=Path, metavar="PATH", help=text)
-    parser.add_argument(
-        "--gate", type=sensor_name, default="mqtt", metavar="NAME", help="name of that gate (default: mqtt)"
-    )
+    parser.takes("--gates", "PATH", text, type=Path)
+    parser.takes("--gate", "NAME", "name of that gate (default: mqtt)", type=sensor_name, default="mqtt")
     add_metrics(parser)
     parser.set_defaults(run=run)
 

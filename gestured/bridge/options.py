@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gestured.client.address import find_socket
+from gestured.client.program import Parser
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import bind_address, host_port, some_of
 from gestured.core.address import Address
@@ -33,26 +34,25 @@ def need(module: str, package: str, extra: str) -> None:
         raise BridgeError(f"this bridge needs the package {package}: {remedy}") from None
 
 
-def add_filters(parser: argparse.ArgumentParser) -> None:
+def add_filters(parser: Parser) -> None:
     """Add the flags for the daemon's event socket and the subscription's filters."""
-    text = "the daemon's event socket (default: the daemon's own default)"
-    parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
+    parser.takes("--socket", "PATH", "the daemon's event socket (default: the daemon's own default)", type=Path)
     text = f"which events, with commas, of {', '.join(EVENT_TYPES)} (default: gesture)"
-    parser.add_argument("--types", type=some_of(EVENT_TYPES), default=["gesture"], metavar="A,B", help=text)
-    parser.add_argument("--sensors", type=names, metavar="A,B", help="only these sensors (default: all)")
-    parser.add_argument("--gestures", type=names, metavar="A,B", help="only these gestures (default: all)")
+    parser.takes("--types", "A,B", text, type=some_of(EVENT_TYPES), default=["gesture"])
+    parser.takes("--sensors", "A,B", "only these sensors (default: all)", type=names)
+    parser.takes("--gestures", "A,B", "only these gestures (default: all)", type=names)
 
 
-def add_metrics(parser: argparse.ArgumentParser) -> None:
+def add_metrics(parser: Parser) -> None:
     """Add the flag for the address of /metrics."""
     text = "HTTP address of /metrics; port 0 takes any free port (default: off)"
-    parser.add_argument("--metrics", type=bind_address, metavar="HOST:PORT", help=text)
+    parser.takes("--metrics", "HOST:PORT", text, type=bind_address)
 
 
-def add_destination(parser: argparse.ArgumentParser) -> None:
+def add_destination(parser: Parser) -> None:
     """Add the flag for the daemon that takes frames."""
     text = "where the daemon listens for frames (default: 127.0.0.1:9000)"
-    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+    parser.takes("--to", "HOST:PORT", text, type=host_port, default=Address("127.0.0.1", 9000))
 
 
 def plain(name: str) -> str:

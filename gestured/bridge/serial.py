@@ -42,13 +42,12 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32\n"
         "  gestured-bridge serial /dev/ttyACM0 --protocol csv --sensor armrest --grid 9x9 --baud 115200",
     )
-    parser.add_argument("device", metavar="DEVICE", help="such as /dev/ttyUSB0, or a link in /dev/serial/by-id")
+    parser.takes("device", "DEVICE", "such as /dev/ttyUSB0, or a link in /dev/serial/by-id")
     parser.add_argument("--protocol", required=True, choices=tuple(PROTOCOLS), help="what the sensor speaks")
-    parser.add_argument("--sensor", type=sensor_name, required=True, metavar="NAME", help="its name for the daemon")
-    text = "bits a second (default: as the protocol's sensors)"
-    parser.add_argument("--baud", type=number(1, 10**9, whole=True), metavar="N", help=text)
+    parser.takes("--sensor", "NAME", "its name for the daemon", type=sensor_name, required=True)
+    parser.takes("--baud", "N", "bits a second (default: as the protocol's sensors)", type=number(1, 10**9, whole=True))
     text = "rows and columns (default: 16x16 for flexitac and e256, else 9x9)"
-    parser.add_argument("--grid", type=rows_by_columns, metavar="RxC", help=text)
+    parser.takes("--grid", "RxC", text, type=rows_by_columns)
     add_destination(parser)
     add_metrics(parser)
     parser.set_defaults(run=run)

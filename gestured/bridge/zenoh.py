@@ -36,11 +36,10 @@ def add(commands: Commands) -> None:
         "  ROS_DOMAIN_ID=7 gestured-bridge zenoh --ros2",
     )
     text = f"a router or peer to call; may be repeated (default: {ROUTER})"
-    parser.add_argument("--connect", action="append", metavar="ENDPOINT", help=text)
+    parser.takes("--connect", "ENDPOINT", text, action="append")
     text = "Zenoh's own configuration (JSON5): certificates, users, where peers may call us"
-    parser.add_argument("--config", type=Path, metavar="FILE", help=text)
-    text = "name of this place in keys (default: the hostname)"
-    parser.add_argument("--site", type=sensor_name, metavar="NAME", help=text)
+    parser.takes("--config", "FILE", text, type=Path)
+    parser.takes("--site", "NAME", "name of this place in keys (default: the hostname)", type=sensor_name)
     add_filters(parser)
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")

@@ -21,6 +21,10 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter} | options)
 
+    def takes(self, name: str, metavar: str, help: str, **options: Any) -> None:
+        """Add an argument with a value, for which `metavar` stands: a flag such as `--seconds`, or one by its place."""
+        self.add_argument(name, metavar=metavar, help=help, **options)
+
     def runs(self, run: Callable[[argparse.Namespace], int], json: str) -> None:
         """Let a subcommand run `run`, and take `--json`, which does what `json` says."""
         self.add_argument("--json", action="store_true", help=json)

@@ -10,15 +10,16 @@ from pathlib import Path
 from gestured.client.address import SOCKET_PATH, control_beside, find_control, find_socket, running, setting
 from gestured.client.control import Control
 from gestured.client.lines import Forbidden, Unreachable
+from gestured.client.program import Parser
 
 LAST_S = 3.0  # how long the last lines of the daemon are waited for after `finish`
 
 
-def add_sockets(parser: argparse.ArgumentParser) -> None:
+def add_sockets(parser: Parser) -> None:
     """Add `--control` and `--socket` to a subcommand: either is enough to find the daemon."""
     for flag, what in (("--control", "control"), ("--socket", "event")):
         text = f"the daemon's {what} socket; one of the two is enough (default: of your session, else the service)"
-        parser.add_argument(flag, type=_path, metavar="PATH", help=text)
+        parser.takes(flag, "PATH", text, type=_path)
 
 
 def _path(text: str) -> Path:

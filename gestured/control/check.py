@@ -20,7 +20,7 @@ def add(commands: Commands) -> None:
         "Exit status 3 if it cannot be used.",
         epilog="examples:\n  gesturectl check cnn_lstm\n  gesturectl check --json my_model.onnx",
     )
-    parser.add_argument("model", metavar="MODEL", help="a path, or the name of a shipped model")
+    parser.takes("model", "MODEL", "a path, or the name of a shipped model")
     parser.runs(run, "print what is known about it as JSON")
 
 

@@ -50,7 +50,7 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
     )
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)")
-    parser.add_argument("--seconds", type=number(5, 600), default=60.0, metavar="S", help="how long (default: 60)")
+    parser.takes("--seconds", "S", "how long (default: 60)", type=number(5, 600), default=60.0)
     add_arguments(parser)
     parser.runs(run, "print outcomes and summary as JSON lines")
 

@@ -25,10 +25,10 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl enrol knock --sensor armrest\n"
         "  gesturectl enrol wave --sensor armrest --examples 5",
     )
-    parser.add_argument("name", metavar="NAME", type=_name, help="a-z first, then a-z, 0-9 and _; at most 32")
-    parser.add_argument("--sensor", type=sensor_name, metavar="SENSOR", required=True, help="where it is performed")
+    parser.takes("name", "NAME", "a-z first, then a-z, 0-9 and _; at most 32", type=_name)
+    parser.takes("--sensor", "SENSOR", "where it is performed", type=sensor_name, required=True)
     text = f"how often, 1 to {EXAMPLES} (default: {USUAL})"
-    parser.add_argument("--examples", type=number(1, EXAMPLES, whole=True), default=USUAL, metavar="N", help=text)
+    parser.takes("--examples", "N", text, type=number(1, EXAMPLES, whole=True), default=USUAL)
     add_sockets(parser)
     parser.runs(run, "print one JSON object a line")
 

@@ -31,9 +31,9 @@ def add(commands: Commands) -> None:
         "person in front of it sees it. Sensors of one file have one grid.",
         epilog="example:\n  gesturectl export drive.mcap drive.npz --sensor armrest",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
-    parser.add_argument("out", type=npz, metavar="OUT", help="the .npz to write")
-    parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
+    parser.takes("file", "FILE", "what gesturectl record or flag wrote", type=Path)
+    parser.takes("out", "OUT", "the .npz to write", type=npz)
+    parser.takes("--sensor", "NAME", "only this sensor")
     parser.runs(run, "print what was written as JSON")
 
 

@@ -26,8 +26,8 @@ def add(commands: Commands) -> None:
         "events and the model's sha256, as a recording. The daemon must run with --flight-recorder.",
         epilog='examples:\n  gesturectl flag\n  gesturectl flag wrong.mcap --note "a tap, taken for a swipe"',
     )
-    parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: flag-DATE-TIME.mcap")
-    parser.add_argument("--note", default="", metavar="TEXT", help="what was wrong; kept with it")
+    parser.takes("file", "FILE", "default: flag-DATE-TIME.mcap", type=Path, nargs="?")
+    parser.takes("--note", "TEXT", "what was wrong; kept with it", default="")
     add_sockets(parser)
     parser.runs(run, "print what was kept as JSON")
 

@@ -33,10 +33,10 @@ def add(commands: Commands) -> None:
     add_sockets(parser)
     text = f"comma-separated, of {', '.join(EVENT_TYPES)} (default: gesture)"
     parser.add_argument("--types", type=some_of(EVENT_TYPES), help=text)
-    parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
-    parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
-    parser.add_argument("--zone", action="append", metavar="NAME", help="only what began in this zone; may be repeated")
-    parser.add_argument("--count", type=number(1, 10**9, whole=True), metavar="N", help="end after N events")
+    parser.takes("--sensor", "NAME", "only this sensor; may be repeated", action="append")
+    parser.takes("--gesture", "NAME", "only this gesture; may be repeated", action="append")
+    parser.takes("--zone", "NAME", "only what began in this zone; may be repeated", action="append")
+    parser.takes("--count", "N", "end after N events", type=number(1, 10**9, whole=True))
     parser.add_argument("--reconnect", action="store_true", help="wait for a daemon that is not there (any more)")
     parser.runs(run, "print the daemon's own lines, the hello among them")
 

@@ -30,7 +30,7 @@ def add(commands: Commands) -> None:
         "second without movement. Refused while the sensor is touched: a hand is no baseline.",
         epilog="example:\n  gesturectl recalibrate --sensor armrest",
     )
-    parser.add_argument("--sensor", type=sensor_name, metavar="NAME", help="only this sensor (default: all)")
+    parser.takes("--sensor", "NAME", "only this sensor (default: all)", type=sensor_name)
     _asks(parser, "recalibrate", "sensor")
     parser = commands.add_parser(
         "emit",
@@ -40,9 +40,8 @@ def add(commands: Commands) -> None:
         "gesture stands in a bundle behind /gestured/test.",
         epilog="example:\n  gesturectl emit swipe_left --sensor armrest",
     )
-    parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
-    text = "the sensor named in the event (default: test)"
-    parser.add_argument("--sensor", type=sensor_name, metavar="NAME", help=text)
+    parser.takes("gesture", "GESTURE", "one of the gestures in use")
+    parser.takes("--sensor", "NAME", "the sensor named in the event (default: test)", type=sensor_name)
     _asks(parser, "emit", "gesture", "sensor")
     _add_gates(commands)
     parser = commands.add_parser(
@@ -59,7 +58,7 @@ def add(commands: Commands) -> None:
         "daemon's files; a recording that somebody made keeps what it holds.",
         epilog="example:\n  gesturectl forget knock",
     )
-    parser.add_argument("name", metavar="NAME", help="the gesture's name")
+    parser.takes("name", "NAME", "the gesture's name")
     _asks(parser, "forget", "name")
 
 
@@ -83,10 +82,9 @@ def _add_gates(commands: Commands) -> None:
         which = parser.add_mutually_exclusive_group(required=True)
         which.add_argument("sensor", nargs="?", type=sensor_name, metavar="SENSOR", help="one sensor")
         which.add_argument("--all", action="store_true", help="all sensors, and all that come")
-        text = "the gate, by a name of your choice"
-        parser.add_argument("--gate", type=sensor_name, required=True, metavar="NAME", help=text)
+        parser.takes("--gate", "NAME", "the gate, by a name of your choice", type=sensor_name, required=True)
     text = "seconds after which the gate opens by itself (default: it does not)"
-    inhibit.add_argument("--for", dest="seconds", type=number(0.001, 1e9), metavar="S", help=text)
+    inhibit.takes("--for", "S", text, dest="seconds", type=number(0.001, 1e9))
     _asks(inhibit, "inhibit", "gate", "sensor", "seconds")
     _asks(allow, "allow", "gate", "sensor")
 

@@ -29,12 +29,11 @@ def add(commands: Commands) -> None:
         "  gesturectl pad --listen 192.168.1.5:9110",
     )
     text = f"the one address at which the page is served (default: {DEFAULT}; port 0: any)"
-    parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
-    text = "a daemon that takes the frames (default: one of its own)"
-    parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help=text)
-    parser.add_argument("--sensor", type=sensor_name, default="pad", metavar="NAME", help="its name (default: pad)")
-    parser.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="taxels (default: 9x9)")
-    parser.add_argument("--rate", type=number(5, 200), default=15.0, metavar="HZ", help="frames a second (default: 15)")
+    parser.takes("--listen", "HOST:PORT", text, type=bind_address, default=DEFAULT)
+    parser.takes("--to", "HOST:PORT", "a daemon that takes the frames (default: one of its own)", type=host_port)
+    parser.takes("--sensor", "NAME", "its name (default: pad)", type=sensor_name, default="pad")
+    parser.takes("--grid", "RxC", "taxels (default: 9x9)", type=rows_by_columns, default=(9, 9))
+    parser.takes("--rate", "HZ", "frames a second (default: 15)", type=number(5, 200), default=15.0)
     parser.add_argument("--model", default="cnn_lstm", help="of its own daemon (default: cnn_lstm)")
     add_sockets(parser)
     parser.runs(run, "print the address as JSON")

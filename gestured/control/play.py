@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, cycle
 
+from gestured.client.program import Parser
 from gestured.client.values import number, rows_by_columns, some_of
 from gestured.core.frames import Frame
 from gestured.record.recordings import touches_of
@@ -79,23 +80,14 @@ def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
         yield int(take.counter[n]), Frame(start + float(take.times[n]), values, touches)
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the flags that say what is played, and a list of all kinds at the end of the help."""
     kinds = textwrap.indent(textwrap.fill(", ".join(KINDS), 98), "  ")
     parser.epilog = f"{parser.epilog}\n\nkinds for --kinds:\n{kinds}"
     text = "another person, and another sequence of gestures (default: 0)"
-    parser.add_argument("--seed", type=number(0, 10**6, whole=True), default=0, metavar="N", help=text)
-    parser.add_argument(
-        "--kinds",
-        type=some_of(KINDS),
-        default=(),
-        metavar="A,B",
-        help="perform these kinds, listed below, in turn (default: at random)",
-    )
+    parser.takes("--seed", "N", text, type=number(0, 10**6, whole=True), default=0)
+    text = "perform these kinds, listed below, in turn (default: at random)"
+    parser.takes("--kinds", "A,B", text, type=some_of(KINDS), default=())
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
-    parser.add_argument(
-        "--rate", type=number(5.0, 1000.0), default=15.0, metavar="HZ", help="frames a second (default: 15)"
-    )
-    parser.add_argument(
-        "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
-    )
+    parser.takes("--rate", "HZ", "frames a second (default: 15)", type=number(5.0, 1000.0), default=15.0)
+    parser.takes("--grid", "RxC", "rows and columns (default: 9x9)", type=rows_by_columns, default=(9, 9))

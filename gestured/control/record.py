@@ -35,11 +35,10 @@ def add(commands: Commands) -> None:
         "disk makes it lose is counted. The file is new, and good up to the last second whatever happens.",
         epilog="examples:\n  gesturectl record drive.mcap --seconds 60\n  gesturectl record night.mcap --max-mib 2048",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to write; must not exist")
-    text = "end after so long (default: at Ctrl-C)"
-    parser.add_argument("--seconds", type=number(0.001, 1e9), metavar="S", help=text)
+    parser.takes("file", "FILE", "what to write; must not exist", type=Path)
+    parser.takes("--seconds", "S", "end after so long (default: at Ctrl-C)", type=number(0.001, 1e9))
     most = number(1, 1 << 20, whole=True)
-    parser.add_argument("--max-mib", type=most, default=1024, metavar="N", help="end at this size (default: 1024)")
+    parser.takes("--max-mib", "N", "end at this size (default: 1024)", type=most, default=1024)
     add_sockets(parser)
     parser.runs(run, "print the summary as JSON")
 

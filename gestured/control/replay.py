@@ -51,21 +51,15 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl replay drive.mcap --diff --model candidate.onnx\n"
         "  gesturectl replay 07.npz --to 127.0.0.1:9000 --speed 10",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote, or an .npz")
-    parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help="send it to the daemon that listens there")
+    parser.takes("file", "FILE", "what gesturectl record or flag wrote, or an .npz", type=Path)
+    parser.takes("--to", "HOST:PORT", "send it to the daemon that listens there", type=host_port)
     parser.add_argument("--diff", action="store_true", help="compare with the recorded events, or the labels")
-    text = "with --to: so many times as fast"
-    parser.add_argument("--speed", type=number(0.001, 1000), default=1.0, metavar="X", help=text)
-    parser.add_argument(
-        "--model",
-        metavar="MODEL",
-        help="without --to: the model (default: the recorded one, if it is a shipped one)",
-    )
+    parser.takes("--speed", "X", "with --to: so many times as fast", type=number(0.001, 1000), default=1.0)
+    parser.takes("--model", "MODEL", "without --to: the model (default: the recorded one, if it is a shipped one)")
     parser.add_argument(
         "--provisional", action="store_true", help="without --to: also print what was said before the answers"
     )
-    text = "the sensor's name, for an .npz"
-    parser.add_argument("--sensor", type=sensor_name, default="recording", metavar="NAME", help=text)
+    parser.takes("--sensor", "NAME", "the sensor's name, for an .npz", type=sensor_name, default="recording")
     parser.runs(run, "print events, or differences, as JSON lines")
 
 

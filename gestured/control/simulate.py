@@ -30,12 +30,10 @@ def add(commands: Commands) -> None:
         "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob\n"
         "  gesturectl simulate --everyday seat",
     )
-    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
-                        help="where the daemon listens (default: 127.0.0.1:9000)")  # fmt: skip
-    parser.add_argument(
-        "--sensor", type=sensor_name, default="simulated", metavar="NAME", help="its name (default: simulated)"
-    )
-    parser.add_argument("--seconds", type=number(0.001, 1e9), metavar="S", help="end after so long (default: go on)")
+    text = "where the daemon listens (default: 127.0.0.1:9000)"
+    parser.takes("--to", "HOST:PORT", text, type=host_port, default=Address("127.0.0.1", 9000))
+    parser.takes("--sensor", "NAME", "its name (default: simulated)", type=sensor_name, default="simulated")
+    parser.takes("--seconds", "S", "end after so long (default: go on)", type=number(0.001, 1e9))
     parser.add_argument(
         "--everyday",
         nargs="?",

@@ -39,9 +39,8 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl sniff --seconds 3\n  gesturectl sniff --listen 0.0.0.0:9000",
     )
     seconds = number(0.001, 86_400)
-    parser.add_argument("--seconds", type=seconds, default=5.0, metavar="S", help="how long (default: 5)")
-    text = "listen at this UDP address itself; no daemon may have it"
-    parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help=text)
+    parser.takes("--seconds", "S", "how long (default: 5)", type=seconds, default=5.0)
+    parser.takes("--listen", "HOST:PORT", "listen at this UDP address itself; no daemon may have it", type=host_port)
     add_sockets(parser)
     parser.runs(run, "print what was seen as JSON")
 

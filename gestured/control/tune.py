@@ -42,10 +42,10 @@ def add(commands: Commands) -> None:
         "  gesturectl tune recordings/07.npz evening.mcap --model my.onnx\n"
         "  gesturectl tune monday.mcap tuesday.mcap --budget 0.5",
     )
-    parser.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="an .npz with labels, or a tape")
-    parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="shipped, or a file (default: cnn_lstm)")
+    parser.takes("recordings", "FILE", "an .npz with labels, or a tape", type=Path, nargs="+")
+    parser.takes("--model", "MODEL", "shipped, or a file (default: cnn_lstm)", default="cnn_lstm")
     text = "how many false gestures an hour there may be at most"
-    parser.add_argument("--budget", type=number(0.001, 100), metavar="PER_HOUR", help=text)
+    parser.takes("--budget", "PER_HOUR", text, type=number(0.001, 100))
     parser.runs(run, "print the figures as JSON")
 
 

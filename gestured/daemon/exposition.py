@@ -25,29 +25,22 @@ _OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], str], ...
     ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", sum, "bad_taxels"),
     ("gestured_sensor_drift_ratio", "How far the baseline has gone, in units of noise", max, "drift"),
 )
-_OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Status], float]], ...] = (
-    ("gestured_sensors", "Sensors that were heard", lambda s: sum("source" in one for one in s["sensors"].values())),
-    (
-        "gestured_sensors_silent",
-        "Sensors of which a gate is closed",
-        lambda s: sum(bool(one["closed"]) for one in s["sensors"].values()),
-    ),
-    ("gestured_clients", "Clients of the event socket", lambda s: s["output"]["subscribers"]),
-    ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s["output"]["backlog_bytes"]),
-    ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s["input"]["kernel_drops"]),
-    (
-        "gestured_loop_lag_seconds",
-        "Seconds by which the event loop runs late, or reads packets late",
-        lambda s: s["loop_lag_s"],
-    ),
-    (
-        "gestured_model_rung",
-        "Place of the model that answers: 0 is the first, 1 its first fallback",
-        lambda s: s["model"]["rung"],
-    ),
-    ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s["model"]["failures"]),
-    ("gestured_start_time_seconds", "When the daemon started", lambda s: s["started"]),
-)
+
+
+def _of_the_daemon(status: Status) -> Iterator[tuple[str, str, float]]:
+    """Name, help and value of each figure without a label; names of counters end in `_total`."""
+    sensors = status["sensors"].values()
+    yield "gestured_sensors", "Sensors that were heard", sum("source" in one for one in sensors)
+    yield "gestured_sensors_silent", "Sensors of which a gate is closed", sum(bool(one["closed"]) for one in sensors)
+    yield "gestured_clients", "Clients of the event socket", status["output"]["subscribers"]
+    yield "gestured_backlog_bytes", "Bytes that wait for slow clients", status["output"]["backlog_bytes"]
+    yield "gestured_kernel_drops_total", "Packets that found no room", status["input"]["kernel_drops"]
+    late = "Seconds by which the event loop runs late, or reads packets late"
+    yield "gestured_loop_lag_seconds", late, status["loop_lag_s"]
+    rung = "Place of the model that answers: 0 is the first, 1 its first fallback"
+    yield "gestured_model_rung", rung, status["model"]["rung"]
+    yield "gestured_model_failures_total", "Models put aside since the last reload", status["model"]["failures"]
+    yield "gestured_start_time_seconds", "When the daemon started", status["started"]
 
 
 class _Collector:
@@ -79,11 +72,11 @@ class _Collector:
                     histogram.add_metric(labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0])
                 yield histogram
         status = self._status
-        for name, text, read in _OF_THE_DAEMON:
+        for name, text, figure in _of_the_daemon(status):
             if name.endswith("_total"):
-                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(status))
+                yield CounterMetricFamily(name.removesuffix("_total"), text, value=figure)
             else:
-                yield GaugeMetricFamily(name, text, value=read(status))
+                yield GaugeMetricFamily(name, text, value=figure)
         labelled: dict[str, list[Status]] = {}
         for name, sensor in status["sensors"].items():
             labelled.setdefault(self._metrics.sensor_label(name), []).append(sensor)

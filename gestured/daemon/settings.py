@@ -1,7 +1,7 @@
 """The settings. Every key is described here and nowhere else, since help and documents are made from this module."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -28,6 +28,11 @@ from gestured.daemon.values import (
 )
 
 
+def setting(default: Any, description: str, **bounds: Any) -> Any:
+    """A setting that need not be set: its default, what it is, and pydantic's bounds of its value."""
+    return Field(default=default, description=description, **bounds)
+
+
 class Part(BaseModel):
     """Base of all settings: unknown keys are errors, and no value changes once it was read."""
 
@@ -40,8 +45,8 @@ class ZoneSettings(Part):
     at: tuple[Number, Number, Number, Number] = Field(
         description="left, bottom, right and top edge in fractions of the sensor as a person in front of it sees it"
     )
-    gestures: Annotated[tuple[str, ...], Listed] | None = Field(
-        default=None, description="the gestures that may begin there; all in use unless set"
+    gestures: Annotated[tuple[str, ...], Listed] | None = setting(
+        None, "the gestures that may begin there; all in use unless set"
     )
 
 
@@ -49,43 +54,30 @@ class ArmingSettings(Part):
     """`[arming]`, `[sensors.NAME.arming]`: the gesture before which no other counts."""
 
     by: str = Field(description="the gesture that arms: one in use, or an own one that was enrolled")
-    seconds: Number = Field(
-        default=Arming("").seconds,
-        gt=0,
-        le=LONGEST_S,
-        description="seconds that a sensor stays armed after its last gesture",
+    seconds: Number = setting(
+        Arming("").seconds, "seconds that a sensor stays armed after its last gesture", gt=0, le=LONGEST_S
     )
 
 
 class GatesSettings(Part):
     """`[gates]`: the gates that keep sensors silent."""
 
-    start: tuple[GateName, ...] = Field(
-        default=(), description="names of gates that are closed at every start, until they are allowed"
-    )
+    start: tuple[GateName, ...] = setting((), "names of gates that are closed at every start, until they are allowed")
 
 
 class SensorSettings(Part):
     """`[sensors.NAME]`: how one sensor is built and mounted."""
 
-    grid: GridField | None = Field(
-        default=None, description="rows x columns of its frames; by default the general `grid`"
+    grid: GridField | None = setting(None, "rows x columns of its frames; by default the general `grid`")
+    rotate: Literal[0, 90, 180, 270] = setting(0, "how far it is turned, in degrees clockwise")
+    mirror: Switch = setting(False, "whether left and right are exchanged")
+    invert: Switch = setting(False, "whether its counts fall under pressure")
+    clock: Literal["arrival", "sensor"] | None = setting(
+        None, "where its frames' times come from; by default the general `clock`"
     )
-    rotate: Literal[0, 90, 180, 270] = Field(default=0, description="how far it is turned, in degrees clockwise")
-    mirror: Switch = Field(default=False, description="whether left and right are exchanged")
-    invert: Switch = Field(default=False, description="whether its counts fall under pressure")
-    clock: Literal["arrival", "sensor"] | None = Field(
-        default=None, description="where its frames' times come from; by default the general `clock`"
-    )
-    strictness: Strictness | None = Field(
-        default=None, description="eager, normal or strict; by default the general `strictness`"
-    )
-    zones: dict[SensorName, ZoneSettings] = Field(
-        default={}, description="tables `[sensors.NAME.zones.ZONE]`, in the file only"
-    )
-    arming: ArmingSettings | None = Field(
-        default=None, description="table `[sensors.NAME.arming]`; by default the general `[arming]`"
-    )
+    strictness: Strictness | None = setting(None, "eager, normal or strict; by default the general `strictness`")
+    zones: dict[SensorName, ZoneSettings] = setting({}, "tables `[sensors.NAME.zones.ZONE]`, in the file only")
+    arming: ArmingSettings | None = setting(None, "table `[sensors.NAME.arming]`; by default the general `[arming]`")
 
     @model_validator(mode="after")
     def _apart(self) -> "SensorSettings":
@@ -96,22 +88,17 @@ class SensorSettings(Part):
 class GestureSettings(Part):
     """`[gestures.NAME]`: when one gesture counts."""
 
-    threshold: Number | None = Field(
-        default=None,
-        ge=0,
-        le=1,
-        description="confidence below which it is unknown, whatever the `strictness`; by default the model's",
+    threshold: Number | None = setting(
+        None, "confidence below which it is unknown, whatever the `strictness`; by default the model's", ge=0, le=1
     )
-    refractory_s: Number = Field(
-        default=0, ge=0, le=3600, description="seconds in which the same gesture is not published again"
-    )
+    refractory_s: Number = setting(0, "seconds in which the same gesture is not published again", ge=0, le=3600)
 
 
 class AddressSettings(Part):
     """`[addresses]`: the OSC addresses that the sensors' firmware uses."""
 
-    pressure: str = Field(default="/{sensor}/pressure", description="address of a pressure frame")
-    trajectory: str = Field(default="/{sensor}/trajectory", description="address of finger positions")
+    pressure: str = setting("/{sensor}/pressure", "address of a pressure frame")
+    trajectory: str = setting("/{sensor}/trajectory", "address of finger positions")
 
     @model_validator(mode="after")
     def _usable(self) -> "AddressSettings":
@@ -122,113 +109,83 @@ class AddressSettings(Part):
 class Settings(Part):
     """Everything that can be set. Each key is a flag and a `GESTURED_*` variable too, but for the tables."""
 
-    model: str = Field(
-        default="cnn_lstm",
-        min_length=1,
-        description="path of a model, or the name of one that ships with gestured",
+    model: str = setting("cnn_lstm", "path of a model, or the name of one that ships with gestured", min_length=1)
+    fallback: Annotated[tuple[str, ...], Listed] = setting(
+        (), "models to fall back on, best first; the shipped models bring their own"
     )
-    fallback: Annotated[tuple[str, ...], Listed] = Field(
-        default=(), description="models to fall back on, best first; the shipped models bring their own"
+    listen: AddressField = setting(
+        Address("127.0.0.1", 9000), "UDP address where OSC frames arrive", validate_default=False
     )
-    listen: AddressField = Field(
-        default=Address("127.0.0.1", 9000),
-        validate_default=False,
-        description="UDP address where OSC frames arrive",
+    publish: Annotated[tuple[DestinationField, ...], Listed] = setting(
+        (), "osc://HOST:PORT to which events are sent, or tuio://HOST:PORT, fingers while they touch"
     )
-    publish: Annotated[tuple[DestinationField, ...], Listed] = Field(
-        default=(),
-        description="osc://HOST:PORT to which events are sent, or tuio://HOST:PORT, fingers while they touch",
-    )
-    socket: SocketField | None = Field(
-        default=None,
-        description="Unix socket of the event stream; by default $RUNTIME_DIRECTORY/events.sock, "
+    socket: SocketField | None = setting(
+        None,
+        "Unix socket of the event stream; by default $RUNTIME_DIRECTORY/events.sock, "
         "else $XDG_RUNTIME_DIR/gestured/events.sock, for root /run/gestured/events.sock",
     )
-    control: SocketField | None = Field(
-        default=None,
-        description="Unix socket for the requests of gesturectl; by default the event socket's path, "
-        "with .ctl in place of .sock",
+    control: SocketField | None = setting(
+        None,
+        "Unix socket for the requests of gesturectl; by default the event socket's path, with .ctl in place of .sock",
     )
-    gates: SocketField | None = Field(
-        default=None,
-        description="Unix socket on which bridges close and open gates, and can do nothing else; off unless set. "
+    gates: SocketField | None = setting(
+        None,
+        "Unix socket on which bridges close and open gates, and can do nothing else; off unless set. "
         "A file names it as `socket` under [gates]",
     )
-    metrics: AddressField | None = Field(
-        default=None, description="HTTP address of /metrics, /healthz and /readyz; off unless set"
-    )
-    grid: GridField | None = Field(
-        default=None, description="rows x columns of the sensors' frames; by default the model's"
-    )
-    gestures: Annotated[tuple[str, ...], Listed] | None = Field(
-        default=None,
-        description="the gestures in use; all of the model's unless set. A file with tables [gestures.NAME] "
+    metrics: AddressField | None = setting(None, "HTTP address of /metrics, /healthz and /readyz; off unless set")
+    grid: GridField | None = setting(None, "rows x columns of the sensors' frames; by default the model's")
+    gestures: Annotated[tuple[str, ...], Listed] | None = setting(
+        None,
+        "the gestures in use; all of the model's unless set. A file with tables [gestures.NAME] "
         "names them as `use` under [gestures]",
     )
-    strictness: Strictness = Field(
-        default=USUAL,
-        description="eager, normal or strict: how sure the model must be. The stricter, the fewer gestures that nobody "
+    strictness: Strictness = setting(
+        USUAL,
+        "eager, normal or strict: how sure the model must be. The stricter, the fewer gestures that nobody "
         "made, and the more that must be repeated",
     )
-    clock: Literal["arrival", "sensor"] = Field(
-        default="arrival",
-        description="where a frame's time comes from: its arrival, or the increments of the sensor's time tags",
+    clock: Literal["arrival", "sensor"] = setting(
+        "arrival", "where a frame's time comes from: its arrival, or the increments of the sensor's time tags"
     )
-    stale_s: Number = Field(
-        default=Timing().stale_s,
-        ge=STALE_S[0],
-        le=STALE_S[1],
-        description="seconds of silence after which a sensor counts as gone",
+    stale_s: Number = setting(
+        Timing().stale_s, "seconds of silence after which a sensor counts as gone", ge=STALE_S[0], le=STALE_S[1]
     )
-    tap_gap_s: Number = Field(
-        default=Timing().tap_gap_s,
-        ge=TAP_GAP_S[0],
-        le=TAP_GAP_S[1],
-        description="seconds that a tap waits for a second one",
+    tap_gap_s: Number = setting(
+        Timing().tap_gap_s, "seconds that a tap waits for a second one", ge=TAP_GAP_S[0], le=TAP_GAP_S[1]
     )
-    provisional_taps: Switch = Field(
-        default=True,
-        description="whether a single tap gets a provisional event before it is sure that no second one follows",
+    provisional_taps: Switch = setting(
+        True, "whether a single tap gets a provisional event before it is sure that no second one follows"
     )
-    publish_provisional: Switch = Field(
-        default=False, description="whether provisional events and their revocations are also sent to `publish`"
+    publish_provisional: Switch = setting(
+        False, "whether provisional events and their revocations are also sent to `publish`"
     )
-    touch: Switch = Field(
-        default=False,
-        description="whether clients may follow fingers while they touch, by events of the type touch; they tell who "
+    touch: Switch = setting(
+        False,
+        "whether clients may follow fingers while they touch, by events of the type touch; they tell who "
         "presses what, and when",
     )
-    max_sensors: Count = Field(
-        default=64,
-        ge=1,
-        le=MOST_SENSORS,
-        description="how many sensors at a time; further ones are dropped and counted",
+    max_sensors: Count = setting(
+        64, "how many sensors at a time; further ones are dropped and counted", ge=1, le=MOST_SENSORS
     )
-    allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
-        default=(), description="addresses or networks that may send frames; any unless set"
+    allow: Annotated[tuple[NetworkField, ...], Listed] = setting(
+        (), "addresses or networks that may send frames; any unless set"
     )
-    flight_recorder: Count = Field(
-        default=0,
-        ge=0,
-        le=1024,
-        description="MiB of memory in which the last 30 s of packets are kept; 0: none are kept",
+    flight_recorder: Count = setting(
+        0, "MiB of memory in which the last 30 s of packets are kept; 0: none are kept", ge=0, le=1024
     )
-    own_gestures: FileField | None = Field(
-        default=None,
-        description="file in which the daemon keeps gestures of your own; by default "
+    own_gestures: FileField | None = setting(
+        None,
+        "file in which the daemon keeps gestures of your own; by default "
         "$STATE_DIRECTORY/own-gestures.json, else $XDG_STATE_HOME/gestured/own-gestures.json, "
         "else ~/.local/state/gestured/own-gestures.json",
     )
-    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
-    sensors: dict[SensorName, SensorSettings] = Field(
-        default={}, description="tables `[sensors.NAME]`, in the file only"
-    )
-    per_gesture: dict[str, GestureSettings] = Field(
-        default={}, description="tables `[gestures.NAME]`, in the file only"
-    )
-    addresses: AddressSettings = Field(default=AddressSettings(), description="table `[addresses]`, in the file only")
-    arming: ArmingSettings | None = Field(default=None, description="table `[arming]`, in the file only")
-    gate: GatesSettings = Field(default=GatesSettings(), description="table `[gates]`, in the file only")
+    log_level: Literal["debug", "info", "warning", "error"] = setting("info", "how much is logged")
+    sensors: dict[SensorName, SensorSettings] = setting({}, "tables `[sensors.NAME]`, in the file only")
+    per_gesture: dict[str, GestureSettings] = setting({}, "tables `[gestures.NAME]`, in the file only")
+    addresses: AddressSettings = setting(AddressSettings(), "table `[addresses]`, in the file only")
+    arming: ArmingSettings | None = setting(None, "table `[arming]`, in the file only")
+    gate: GatesSettings = setting(GatesSettings(), "table `[gates]`, in the file only")
 
 
 TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # settings that are tables, in the file only

@@ -53,7 +53,7 @@ def parser() -> Parser:
         "example: gestured-lab train --out models",
     )  # fmt: skip
 
-    def add(name: str, text: str, example: str) -> argparse.ArgumentParser:
+    def add(name: str, text: str, example: str) -> Parser:
         command = commands.add_parser(
             name, help=text, description=text, epilog=f"example: {example}", formatter_class=argparse.HelpFormatter
         )
@@ -61,14 +61,13 @@ def parser() -> Parser:
         command.set_defaults(command=name, run=_run)
         return command
 
-    def add_data(command: argparse.ArgumentParser) -> None:
-        command.add_argument(
-            "--cache", type=Path, default=CACHE, help=f"where finished steps are kept (default: {CACHE})"
-        )
+    def add_data(command: Parser) -> None:
+        text = f"where finished steps are kept (default: {CACHE})"
+        command.add_argument("--cache", type=Path, default=CACHE, help=text)
         command.add_argument("--jobs", type=JOBS, default=2, help="processes and threads (default: 2)")
         command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
-        command.add_argument("--real", type=Path, metavar="FOLDER", help="folder of real recordings, as "
-                             "docs/training.md has it (default: simulated people alone)")  # fmt: skip
+        text = "folder of real recordings, as docs/training.md has it (default: simulated people alone)"
+        command.takes("--real", "FOLDER", text, type=Path)
 
     mine: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "FILE"}
     train = add("train", "train the three models from nothing; goes on where it was interrupted",
@@ -79,74 +78,56 @@ def parser() -> Parser:
     adapt = add("adapt", "train a shipped model further with recordings of your own, and print what that is worth; "
                 "writes nothing, with exit status 1, unless it is better",
                 "gestured-lab adapt recordings/*.npz --out my.onnx")  # fmt: skip
-    adapt.add_argument("recordings", type=Path, nargs="+", metavar="FILE",
-                       help="recordings of your own (.npz), and perhaps tapes in which nobody made a gesture (.mcap): "
-                            "with tapes, the model learns to be silent")  # fmt: skip
-    adapt.add_argument("--out", type=Path, required=True, metavar="MODEL", help="a new file for the model (*.onnx)")
-    adapt.add_argument(
-        "--base", default="cnn_lstm", metavar="MODEL", help="cnn_lstm, lstm, or a file (default: cnn_lstm)"
-    )
-    adapt.add_argument("--as-none", action="append", default=[], metavar="NAME",
-                       help="take recordings with this name of your own as non-gestures "
-                            "(default: leave them out)")  # fmt: skip
+    adapt.takes("recordings", "FILE", "recordings of your own (.npz), and perhaps tapes in which nobody made a gesture "
+                "(.mcap): with tapes, the model learns to be silent", type=Path, nargs="+")  # fmt: skip
+    adapt.takes("--out", "MODEL", "a new file for the model (*.onnx)", type=Path, required=True)
+    adapt.takes("--base", "MODEL", "cnn_lstm, lstm, or a file (default: cnn_lstm)", default="cnn_lstm")
+    text = "take recordings with this name of your own as non-gestures (default: leave them out)"
+    adapt.takes("--as-none", "NAME", text, action="append", default=[])
     adapt.add_argument("--force", action="store_true", help="write the model also where it is no better")
-    adapt.add_argument(
-        "--cache", type=Path, metavar="DIR", help="for simulated takes (default: gestured, in your cache folder)"
-    )
-    adapt.add_argument(
-        "--steps",
-        type=number(1, 10_000, whole=True),
-        default=200,
-        metavar="N",
-        help="training steps for each held-out group, without tapes (default: 200)",
-    )
+    adapt.takes("--cache", "DIR", "for simulated takes (default: gestured, in your cache folder)", type=Path)
+    text = "training steps for each held-out group, without tapes (default: 200)"
+    adapt.takes("--steps", "N", text, type=number(1, 10_000, whole=True), default=200)
     evaluate = add("evaluate", "print the accuracy of models on people that they have not learned from; "
                    "writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models (default: {MODELS})")
-    evaluate.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `figures` is "
-                          "written anew, such as docs/figures.md, and others whose block `worst` is")  # fmt: skip
+    text = "a page whose block `figures` is written anew, such as docs/figures.md, and others whose block `worst` is"
+    evaluate.takes("--document", "PAGE", text, type=Path, nargs="+")
     evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
     everyday = add("everyday", "count false gestures in hours of everyday contact, simulated or of your own, and what "
                    "becomes of the gestures that were meant in them",
                    "gestured-lab everyday cnn_lstm --hours 10 --svg curve.svg")  # fmt: skip
-    everyday.add_argument("model", nargs="?", default="cnn_lstm", metavar="MODEL",
-                          help="a shipped model, or a file (default: cnn_lstm)")  # fmt: skip
-    everyday.add_argument(
-        "--hours",
-        type=number(1, 100_000, whole=True),
-        default=60,
-        help="of simulated people, an hour each (default: 60)",
-    )
+    everyday.takes("model", "MODEL", "a shipped model, or a file (default: cnn_lstm)", nargs="?", default="cnn_lstm")
+    text = "of simulated people, an hour each (default: 60)"
+    everyday.add_argument("--hours", type=number(1, 100_000, whole=True), default=60, help=text)
     everyday.add_argument("--recordings", **mine, help="instead, hours of your own: tapes of gesturectl record, and "
                           ".npz; if they do not say what was performed, every gesture counts as false")  # fmt: skip
-    everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
-                          "makes it before each gesture that is meant; without it no gesture counts")  # fmt: skip
-    everyday.add_argument("--seconds", type=float, default=Arming("").seconds, metavar="S",
-                          help="how long a gesture keeps the sensor armed, with --arming "
-                          f"(default: {Arming('').seconds:g} s)")  # fmt: skip
+    everyday.takes("--arming", "GESTURE", "a gesture that arms the sensor: everybody makes it before each gesture that "
+                   "is meant; without it no gesture counts", default="")  # fmt: skip
+    text = f"how long a gesture keeps the sensor armed, with --arming (default: {Arming('').seconds:g} s)"
+    everyday.takes("--seconds", "S", text, type=float, default=Arming("").seconds)
     everyday.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
-    everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
-    everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "
-                          "anew, such as docs/everyday.md")  # fmt: skip
+    everyday.takes("--svg", "FILE", "draw missed against false, with every threshold", type=Path)
+    text = "a page whose tables `everyday` are written anew, such as docs/everyday.md"
+    everyday.takes("--document", "PAGE", text, type=Path)
     everyday.add_argument("--jobs", type=JOBS, default=2, help="processes (default: 2)")
     stability = add("stability", "measure filters, extreme and stiff inputs through the whole path, and models by "
                     "their answers",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="half a minute instead of some minutes")
-    stability.add_argument("--document", type=Path, metavar="FILE",
-                           help="a page whose tables are written anew, such as docs/numerics.md")  # fmt: skip
+    stability.takes("--document", "FILE", "a page whose tables are written anew, such as docs/numerics.md", type=Path)
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
                 "writes its tables, its figures and study.json; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
-    study.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `study` is written "
-                       "anew, such as docs/study.md, with the picture beside it, and others whose block `choice` is, "
-                       "such as docs/figures.md")  # fmt: skip
-    study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
-                       "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
-    study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
+    study.takes("--document", "PAGE", "a page whose block `study` is written anew, such as docs/study.md, with the "
+                "picture beside it, and others whose block `choice` is, such as docs/figures.md",
+                type=Path, nargs="+")  # fmt: skip
+    study.takes("--foreign", "FILE", "recordings that judge, and teach nothing: of another generator "
+                "(python -m experiments.foreign.recordings) or another sensor", type=Path)  # fmt: skip
+    study.takes("--cluster", "ADDRESS", "compute on this Dask cluster, such as tcp://HOST:8786")
     add_data(study)
     add_recordings(add)
     return top

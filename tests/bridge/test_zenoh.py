@@ -1,6 +1,5 @@
 """Events and frames through a real router: Zenoh's own, from its wheel."""
 
-import argparse
 import json
 import queue
 import select
@@ -21,6 +20,7 @@ from gestured.bridge import forward
 from gestured.bridge import zenoh as zenoh_command
 from gestured.bridge.counts import Counts
 from gestured.bridge.zenoh_session import Zenoh
+from gestured.client.program import Parser
 from gestured.core.address import Address
 from tests.bridge.conftest import Process, emit, page, wait
 from tests.bridge.test_mqtt import STATUS, gesture
@@ -270,7 +270,7 @@ def test_a_router_that_hangs_holds_up_no_end(bridge, fake):
 
 def unconnected() -> Zenoh:
     """What a bridge has of Zenoh, to a router that is not there."""
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     zenoh_command.add(parser.add_subparsers())
     return Zenoh(parser.parse_args(["zenoh", "--site", "car", "--connect", "tcp/127.0.0.1:1"]), Counts("zenoh"))
 

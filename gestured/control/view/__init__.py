@@ -28,14 +28,9 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl view\n  gesturectl view --listen 127.0.0.1:0 --folder flagged",
     )
     text = f"where the page is served, a loopback address (default: {DEFAULT}; port 0: any)"
-    parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
-    parser.add_argument(
-        "--folder",
-        type=Path,
-        default=Path(),
-        metavar="FOLDER",
-        help="folder for flagged recordings, made where there is none (default: .)",
-    )
+    parser.takes("--listen", "HOST:PORT", text, type=bind_address, default=DEFAULT)
+    text = "folder for flagged recordings, made where there is none (default: .)"
+    parser.takes("--folder", "FOLDER", text, type=Path, default=Path())
     add_sockets(parser)
     parser.runs(run, "print the address as JSON")
 

@@ -7,6 +7,7 @@ from datetime import date
 from pathlib import Path
 
 from gestured.client.pad.server import DEFAULT
+from gestured.client.program import Parser
 from gestured.client.values import bind_address, host_port, npz, number, rows_by_columns, sensor_name, some_of
 from gestured.core.address import Address
 from gestured.core.own import is_name
@@ -25,51 +26,45 @@ A file has a row for each frame: time, then rows x columns values, row by row,
 the top row first; with commas, a heading or none. With a gesture as --label the
 file holds one performance of it, whose touched frames are marked as the daemon
 would see them."""
-Add = Callable[[str, str, str], argparse.ArgumentParser]
+Add = Callable[[str, str, str], Parser]
 
 
 def add_recordings(command: Add) -> None:
     """Add the three subcommands; `command` takes a subcommand's name, its help and an example."""
     collect = command("collect", "lead a participant through the protocol, and record the sensor that sends over OSC",
                       "gestured-lab collect --participant 07 --listen 0.0.0.0:9000")  # fmt: skip
-    collect.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
-                         help="pseudonym: 1 to 32 of A-Z a-z 0-9 _ -")  # fmt: skip
+    collect.takes("--participant", "NAME", "pseudonym: 1 to 32 of A-Z a-z 0-9 _ -", type=pseudonym, required=True)
     collect.add_argument("--out", type=Path, default=FOLDER, help=f"folder for NAME.npz ({FOLDER})")
-    collect.add_argument("--listen", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
-                         help="where the sensor sends to (127.0.0.1:9000)")  # fmt: skip
-    collect.add_argument("--sensor", type=sensor_name, metavar="NAME", help="which sensor (the first that sends)")
-    collect.add_argument(
-        "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="its rows and columns (9x9)"
-    )
-    collect.add_argument("--seed", type=SEED, default=0, metavar="N", help="another order of the trials (0)")
-    collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B",
-                         help="only these, or names of your own (all ten)")  # fmt: skip
-    collect.add_argument("--non-gestures", type=some_of(NON_GESTURES), metavar="A,B",
-                         help="non-gestures, each once beside the gestures (none; with --pad a few)")  # fmt: skip
-    collect.add_argument("--pad", type=bind_address, nargs="?", const=DEFAULT, metavar="HOST:PORT",
-                         help=f"the sensor is a pad on a page that is served here ({DEFAULT})")  # fmt: skip
-    collect.add_argument("--model", default="cnn_lstm", metavar="MODEL",
-                         help="says at once where a gesture looks like another (cnn_lstm)")  # fmt: skip
-    collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")
-    collect.add_argument("--countdown", type=_seconds, default=3, metavar="S", help="seconds before each gesture (3)")
+    text = "where the sensor sends to (127.0.0.1:9000)"
+    collect.takes("--listen", "HOST:PORT", text, type=host_port, default=Address("127.0.0.1", 9000))
+    collect.takes("--sensor", "NAME", "which sensor (the first that sends)", type=sensor_name)
+    collect.takes("--grid", "RxC", "its rows and columns (9x9)", type=rows_by_columns, default=(9, 9))
+    collect.takes("--seed", "N", "another order of the trials (0)", type=SEED, default=0)
+    collect.takes("--gestures", "A,B", "only these, or names of your own (all ten)", type=_gestures, default=GESTURES)
+    text = "non-gestures, each once beside the gestures (none; with --pad a few)"
+    collect.takes("--non-gestures", "A,B", text, type=some_of(NON_GESTURES))
+    text = f"the sensor is a pad on a page that is served here ({DEFAULT})"
+    collect.takes("--pad", "HOST:PORT", text, type=bind_address, nargs="?", const=DEFAULT)
+    collect.takes("--model", "MODEL", "says at once where a gesture looks like another (cnn_lstm)", default="cnn_lstm")
+    collect.takes("--repeats", "N", "times that each trial is done (1)", type=_count, default=1)
+    collect.takes("--countdown", "S", "seconds before each gesture (3)", type=_seconds, default=3)
 
     bring = command("import", "make recordings of CSV files",
                     "gestured-lab import --participant 07 --label one_tap a.csv --out b.npz")  # fmt: skip
     bring.formatter_class = argparse.RawDescriptionHelpFormatter
     bring.description = IMPORT
-    bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")
-    bring.add_argument("--out", type=npz, required=True, metavar="F.npz", help="a new file for all of them")
-    bring.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (9x9)")
+    bring.takes("files", "FILE", "one recording each", type=Path, nargs="+")
+    bring.takes("--out", "F.npz", "a new file for all of them", type=npz, required=True)
+    bring.takes("--grid", "RxC", "rows and columns (9x9)", type=rows_by_columns, default=(9, 9))
     bring.add_argument("--time-unit", choices=("s", "ms", "us"), default="s", help="of the first column (s)")
-    bring.add_argument("--label", type=_label, default=SESSION, metavar="LABEL",
-                      help="what was performed: a gesture, a name of your own, none, or session (session)")  # fmt: skip
-    bring.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
-                       help="whose recordings they are, a pseudonym")  # fmt: skip
-    bring.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
+    text = "what was performed: a gesture, a name of your own, none, or session (session)"
+    bring.takes("--label", "LABEL", text, type=_label, default=SESSION)
+    bring.takes("--participant", "NAME", "whose recordings they are, a pseudonym", type=pseudonym, required=True)
+    bring.takes("--consent", "YYYY-MM-DD", "the day of the participant's consent", type=_day)
     forget = command("forget", "remove a participant from files of recordings, and say which models learned from them",
                      "gestured-lab forget 07 recordings --dry-run")  # fmt: skip
-    forget.add_argument("participant", metavar="NAME", help="as the recordings name the participant")
-    forget.add_argument("paths", type=Path, nargs="+", metavar="DIR|FILE", help="files, and folders of .npz files")
+    forget.takes("participant", "NAME", "as the recordings name the participant")
+    forget.takes("paths", "DIR|FILE", "files, and folders of .npz files", type=Path, nargs="+")
     forget.add_argument("--models", type=Path, default=Path("models"), help="folder of the models to ask (models)")
     forget.add_argument("--yes", action="store_true", help="do not ask")
     forget.add_argument("--dry-run", action="store_true", help="say what would be removed, and remove nothing")
