@@ -34,16 +34,13 @@ def shrunk(picture: NDArray[np.float32]) -> NDArray[np.float32]:
 def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:
     """The five lines of nine characters of a (9, 9) picture: half blocks in grey, or shades without `colour`."""
     padded = np.vstack([picture, np.zeros((len(picture) % 2, picture.shape[1]), np.float32)])
-    pairs = zip(padded[0::2].tolist(), padded[1::2].tolist(), strict=True)
-    paint = _coloured if colour else _shaded
-    return [paint(list(zip(upper, lower, strict=True))) for upper, lower in pairs]
-
-
-def _coloured(cells: list[tuple[float, float]]) -> str:
-    # The block shows where the finger was, the grey when, so the picture can be read as plain text, too.
-    drawn = (f"\x1b[38;5;{FAINT + round(GREYS * max(c))}m{BLOCKS[c[0] > FAINTEST, c[1] > FAINTEST]}" for c in cells)
-    return f"\x1b[48;5;{BACKGROUND}m" + "".join(drawn) + "\x1b[0m"
-
-
-def _shaded(cells: list[tuple[float, float]]) -> str:
-    return "".join(SHADES[round((len(SHADES) - 1) * max(cell))] for cell in cells)
+    lines = []
+    for pair in zip(padded[0::2].tolist(), padded[1::2].tolist(), strict=True):
+        cells = list(zip(*pair, strict=True))
+        if not colour:
+            lines.append("".join(SHADES[round((len(SHADES) - 1) * max(cell))] for cell in cells))
+            continue
+        # The block shows where the finger was, the grey when, so the picture can be read as plain text, too.
+        greys = (f"\x1b[38;5;{FAINT + round(GREYS * max(c))}m{BLOCKS[c[0] > FAINTEST, c[1] > FAINTEST]}" for c in cells)
+        lines.append(f"\x1b[48;5;{BACKGROUND}m{''.join(greys)}\x1b[0m")
+    return lines

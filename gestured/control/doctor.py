@@ -77,7 +77,10 @@ def examine(path: Path) -> Iterator[Finding]:
     except (Unreachable, Refused, Stranger) as error:
         others = running() if isinstance(error, Unreachable) else []
         if others and path not in others:
-            yield _elsewhere(path, others)
+            sockets = [shlex.quote(str(other.with_suffix(".sock"))) for other in others]
+            remedy = f"export GESTURED_SOCKET={sockets[0]} names it to all commands, --socket {sockets[0]} to one"
+            found_at = ", ".join(sockets)
+            yield Finding("bad", f"no daemon on {path}, but one whose event socket is {found_at}", remedy)
             return
         remedy = "does it run? systemctl status gestured; its last words: journalctl --unit gestured --lines 20"
         if path in others and not path.exists():
@@ -90,13 +93,6 @@ def examine(path: Path) -> Iterator[Finding]:
         return
     yield _permissions(path)
     yield from found
-
-
-def _elsewhere(path: Path, others: list[Path]) -> Finding:
-    """The finding that daemons run, but none on `path`."""
-    sockets = [shlex.quote(str(other.with_suffix(".sock"))) for other in others]
-    remedy = f"export GESTURED_SOCKET={sockets[0]} names it to all commands, --socket {sockets[0]} to one"
-    return Finding("bad", f"no daemon on {path}, but one whose event socket is {', '.join(sockets)}", remedy)
 
 
 def _proposed(control: Control) -> list[str]:

@@ -125,7 +125,10 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     suppressed = sum(answers.get("suppressed", {}).values())  # an older daemon has none
     silenced = f", {suppressed} while silent or not armed" if suppressed else ""
     yield f"answers: {total} gestures, {answers['unknown']} unknown{silenced}; cancelled: {cancelled}"
-    yield from _recent(status["recent"])
+    for line in status["recent"][-5:]:
+        at, mark = datetime.fromtimestamp(line["time"]).strftime("%H:%M:%S"), "  (test)" if line["test"] else ""
+        confidence = "" if line["confidence"] is None else f"{line['confidence']:.2f}"
+        yield f"  {at}  {line['sensor'][:16]:<16} {line['answer']:<24} {confidence}{mark}"
     yield ""
     dropped = ", ".join(f"{count} {reason}" for reason, count in status["input"]["dropped"].items()) or "none"
     yield f"dropped packets: {dropped}; by the kernel: {status['input']['kernel_drops']}"
@@ -169,14 +172,6 @@ def listens(told: dict[str, Any]) -> str:
     if told.get("closed"):
         return f"silent, gates closed: {', '.join(told['closed'])}"
     return "armed" if told.get("armed") else "listens" if told.get("armed") is None else "not armed"
-
-
-def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:
-    for line in recent[-5:]:
-        clock = datetime.fromtimestamp(line["time"]).strftime("%H:%M:%S")
-        confidence = "" if line["confidence"] is None else f"{line['confidence']:.2f}"
-        mark = "  (test)" if line["test"] else ""
-        yield f"  {clock}  {line['sensor'][:16]:<16} {line['answer']:<24} {confidence}{mark}"
 
 
 def _shift(shift: dict[str, Any]) -> str:

@@ -59,7 +59,10 @@ class Keeper:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise OwnFileError(self._theirs(lock.read(PID_DIGITS))) from None
+                pid = lock.read(PID_DIGITS)
+                who = f"gestured (pid {int(pid)})" if pid.isdigit() else "gestured"
+                remedy = "enrol and forget there, or give this one a file of its own (--own-gestures FILE)"
+                raise OwnFileError(f"{self.path}: another {who} writes it; {remedy}") from None
             lock.truncate(0)
             lock.write(str(os.getpid()).encode())
         except OSError as error:
@@ -79,13 +82,6 @@ class Keeper:
         if found.fault is not None:
             raise OwnFileError(found.fault)
         self.found = own_file.write(self.path, change(found.gestures), model)
-
-    def _theirs(self, pid: bytes) -> str:
-        who = f"gestured (pid {int(pid)})" if pid.isdigit() else "gestured"
-        return (
-            f"{self.path}: another {who} writes it; enrol and forget there, or give this one a file of its own "
-            "(--own-gestures FILE)"
-        )
 
     def close(self) -> None:
         """Release the lock, so that another daemon may write the file."""

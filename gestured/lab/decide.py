@@ -158,10 +158,8 @@ def threshold(answers: Answers, labels: NDArray[np.int64], sets: NDArray[np.int6
     """
     of = np.zeros(len(labels), np.int64) if sets is None else sets
     scores, unknown = answers
-    worth = [_worth(curve((scores[of == k], unknown[of == k]), labels[of == k])) for k in np.unique(of)]
+    worth = []
+    for k in np.unique(of):
+        right, wrong, accepted = np.nan_to_num(curve((scores[of == k], unknown[of == k]), labels[of == k])).T
+        worth.append(right - WRONG * wrong - ACCEPTED * accepted)
     return THRESHOLDS[int(np.mean(worth, axis=0).argmax())]
-
-
-def _worth(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    right, wrong, accepted = np.nan_to_num(points).T
-    return np.asarray(right - WRONG * wrong - ACCEPTED * accepted)

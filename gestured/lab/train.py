@@ -72,20 +72,11 @@ class TrainingPlan:
     @classmethod
     def quick(cls) -> "TrainingPlan":
         """A run of some minutes, to try the pipeline; its models are of no use."""
-        fit = FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
         return cls(
-            days=10,
-            days_calibrate=10,
-            chance=5,
-            chance_calibrate=5,
-            days_points=10,
-            wide=1_500,
-            wide_calibrate=400,
-            wide_check=400,
-            wide_early=400,
-            forest=2_000,
-            fit=fit,
-        )
+            wide=1_500, wide_calibrate=400, wide_check=400, wide_early=400, forest=2_000,
+            days=10, days_calibrate=10, chance=5, chance_calibrate=5, days_points=10,
+            fit=FitConfig(epochs=3, real_epochs=1, real_samples=1_000),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

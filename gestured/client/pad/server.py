@@ -62,11 +62,7 @@ class PadServer(Server):
 
     def tell(self, kind: str, what: dict[str, Any]) -> None:
         """Send something to the page; without a page it is dropped."""
-        if (outbox := self._outbox) is None:
-            return
-        if kind == "frame":
-            outbox.frame(what)
-        else:
+        if (outbox := self._outbox) is not None:
             outbox.put(kind, what)
 
     def say(self, text: str) -> None:

@@ -17,16 +17,13 @@ class Outbox:
         self._rest: deque[tuple[str, dict[str, Any]]] = deque(maxlen=MOST)
         self._closed = False
 
-    def frame(self, frame: dict[str, Any]) -> None:
-        """Put a frame in the place of the one that waits."""
-        with self._changed:
-            self._frame = frame
-            self._changed.notify()
-
     def put(self, kind: str, what: dict[str, Any]) -> None:
-        """Put an event that must not be left out, unless more than MOST wait."""
+        """Put a `frame` in the place of the one that waits, or another event after those that wait, the latest MOST."""
         with self._changed:
-            self._rest.append((kind, what))
+            if kind == "frame":
+                self._frame = what
+            else:
+                self._rest.append((kind, what))
             self._changed.notify()
 
     def close(self) -> None:

@@ -60,7 +60,7 @@ class Source:
         if self._state:
             outbox.put("sensors", self._state)
         if outbox.sensor in self._latest:
-            outbox.frame(self._latest[outbox.sensor])
+            outbox.put("frame", self._latest[outbox.sensor])
         with self._changed:
             self._open.append(outbox)
             self._look_anew()
@@ -135,28 +135,24 @@ class Source:
 
     def _pass_on(self, line: dict[str, Any]) -> None:
         """Put a line of the daemon into the outboxes that it is for."""
-        if line["type"] == "view":
-            self._latest[line["sensor"]] = line
-            for outbox in self._lookers(line["sensor"]):
-                outbox.frame(line)
-        elif line["type"] == "state":
+        kind = line["type"]
+        if kind in ("view", "provisional", "touch"):  # for those who look at this sensor
+            if kind == "view":
+                self._latest[line["sensor"]] = line
+            for outbox in [one for one in list(self._open) if one.sensor == line["sensor"]]:
+                if kind == "touch":
+                    outbox.touch(line)
+                else:
+                    outbox.put("frame" if kind == "view" else "event", line)
+        elif kind == "state":
             told = {key: line[key] for key in ("version", "state", "sensors")}
             found = [asdict(finding) for finding in examine_sensors(line) if finding.level != "ok"]
             recorder = line["flight_recorder"]["limit_bytes"] > 0
             told |= {"model": line["model"]["active"], "findings": found, "flight_recorder": recorder}
             self._state = told
             self._tell("sensors", told)
-        elif line["type"] == "provisional":
-            for outbox in self._lookers(line["sensor"]):
-                outbox.put("event", line)
-        elif line["type"] == "touch":
-            for outbox in self._lookers(line["sensor"]):
-                outbox.touch(line)
         else:
             self._tell("event", line)
-
-    def _lookers(self, sensor: str) -> list[Looker]:
-        return [outbox for outbox in list(self._open) if outbox.sensor == sensor]
 
     def _wanted(self) -> Looked:
         looks = list(self._open)

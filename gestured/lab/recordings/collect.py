@@ -119,8 +119,10 @@ class Session:
                 answer, take = self._once(trial)
             except Paused:
                 say("\nPaused. Enter goes on, q quits.")
-                while self._key() != "\n":
-                    pass
+                key = ""
+                while key != "\n":
+                    with suppress(Paused):  # it is paused already
+                        key = self._until(None)
                 continue
             if answer == "d":
                 return None
@@ -212,12 +214,6 @@ class Session:
             if rest <= 0:
                 return ""
             select.select([self._terminal.fileno(), self._sensor.socket.fileno()], [], [], min(rest, 0.5))
-
-    def _key(self) -> str:
-        try:
-            return self._until(None)
-        except Paused:
-            return "p"
 
 
 def run(args: argparse.Namespace) -> int:

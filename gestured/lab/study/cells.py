@@ -57,19 +57,18 @@ class Schedule:
         done = {task: _read(path) for task, path in paths.items() if path.exists()}
         found = {task: result for task, result in done.items() if result is not None}
         todo = [task for task in paths if task not in found]
-        for task, result in self._computed(todo, sets, title):
+        if not todo:
+            return found
+        if self.cluster is None:
+            cells = [(task, sets[task.data]) for task in todo]  # a process is sent the data of its cell alone
+            computed = in_processes(_cell, cells, self.jobs, title)
+        else:
+            computed = progress(_there(todo, sets, self.cluster), len(todo), title)
+        for task, result in computed:
             keep(paths[task], result)
             found[task] = result
         return found
 
-    def _computed(self, todo: Sequence[Task], sets: Mapping[str, Data], title: str) -> Iterator[tuple[Task, Result]]:
-        if not todo:
-            return
-        if self.cluster is None:
-            cells = [(task, sets[task.data]) for task in todo]  # a process is sent the data of its cell alone
-            yield from in_processes(_cell, cells, self.jobs, title)
-        else:
-            yield from progress(_there(todo, sets, self.cluster), len(todo), title)
 
 
 def compute(task: Task, data: Data) -> tuple[Task, Result]:
