@@ -102,7 +102,6 @@ class Mqtt:
         raise error
 
     def _take(self, line: Line) -> None:
-        """Take one line of the daemon."""
         self._daemon.take(line)
         if "sensor" in line:  # an event, which the daemon has filtered already
             if len(self._waiting) >= WAITING_EVENTS:
@@ -157,7 +156,6 @@ class Mqtt:
         self._send()
 
     def _gone(self, client: Any, error: Any) -> None:
-        """A connection has ended, or could not be made."""
         if client is not self._client:
             return
         held_s = time.monotonic() - self._since if self._connected else None
@@ -172,7 +170,6 @@ class Mqtt:
             self._wait_s = min(2 * self._wait_s, LONGEST_S)
 
     def _taken(self, client: Any, number: int, code: Any) -> None:
-        """The broker has acknowledged or refused a message."""
         if client is not self._client:
             return
         if code.is_failure:
@@ -185,7 +182,6 @@ class Mqtt:
         self._send()
 
     def _subscribed(self, client: Any, codes: Any) -> None:
-        """The broker has accepted or refused the subscription to commands."""
         if client is self._client and codes[0].is_failure:
             raise self._broker.unreadable(codes[0], self._commanded)
 

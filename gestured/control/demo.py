@@ -210,7 +210,6 @@ class Show:
             )
 
     def _draw(self) -> None:
-        """Draw the newest view that has come, if any."""
         came = [self._views.get() for _ in range(self._views.qsize())]
         views = [line for line in came if line is not None and line["type"] == "view"]
         if self.screen is not None and views:

@@ -111,7 +111,6 @@ def _reloaded(answer: dict[str, Any]) -> Iterable[str]:
 
 
 def _gates(answer: dict[str, Any]) -> Iterable[str]:
-    """Which sensors are silent now, and which gates are closed."""
     silent = [f"{name} ({', '.join(gates)})" for name, gates in answer["sensors"].items() if gates]
     listen = [name for name, gates in answer["sensors"].items() if not gates]
     parts = [f"{word}: {', '.join(names)}" for word, names in (("silent", silent), ("no gate closed", listen)) if names]

@@ -89,7 +89,6 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _here(args: argparse.Namespace, source: Playable) -> int:
-    """Replay in this process, without a daemon."""
     scene, ladder = _opened(source, args.model)
     try:
         replay = Replay(source.tape, scene, ladder, provisional=args.provisional)

@@ -82,7 +82,6 @@ class Service:
         return (parts.clients, *parts.asked.outputs, parts.taps, parts.views)
 
     def _hello(self) -> bytes:
-        """The first line that a client is sent."""
         parts = self.parts
         who = {"version": __version__, "instance": parts.instance, "model": parts.ladder.active}
         sensors, gates = parts.hub.sequences(), parts.listening()

@@ -123,7 +123,7 @@ def one_epoch(
     table = symmetry_table(CLASSES)
     criterion = nn.CrossEntropyLoss(label_smoothing=config.smoothing)
     nets.train()
-    plan = [(k, index) for k, (s, _, chosen) in enumerate(sets) for index in _plan(s, config, rng, chosen)]
+    plan = [(k, index) for k, (s, _, chosen) in enumerate(sets) for index in similar(s, chosen, config.batch, rng)]
     shown = [Shown(samples, config.unfinished) for samples, _, _ in sets]
     total = 0.0
     for place in progress(rng.permutation(len(plan)), len(plan), title):
@@ -151,16 +151,16 @@ def step(
     schedule.step()
 
 
-def _plan(
-    samples: Samples, config: FitConfig, rng: np.random.Generator, chosen: NDArray[np.int64]
+def similar(
+    samples: Samples, chosen: NDArray[np.int64], batch: int, rng: np.random.Generator
 ) -> Iterator[NDArray[np.int64]]:
-    """Groups of samples of similar length, so that little is padded."""
+    """The chosen samples in batches of similar length, so that little is padded, but in random order."""
     lengths, order = samples.lengths(), rng.permutation(chosen)
-    for start in range(0, len(order), 20 * config.batch):
-        pool = order[start : start + 20 * config.batch]
+    for start in range(0, len(order), 20 * batch):
+        pool = order[start : start + 20 * batch]
         pool = pool[np.argsort(lengths[pool] + rng.random(len(pool)) * 3)]
-        for i in range(0, len(pool), config.batch):
-            yield pool[i : i + config.batch]
+        for i in range(0, len(pool), batch):
+            yield pool[i : i + batch]
 
 
 def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Sequence[str] = NETS) -> nn.ModuleDict:
@@ -172,7 +172,7 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
     for net in nets.values():
         if isinstance(net, TrajectoryNet):
             _fit_scale(net, samples, chosen, config)
-    steps = config.epochs * len(list(_plan(samples, config, np.random.default_rng(0), chosen)))
+    steps = config.epochs * len(list(similar(samples, chosen, config.batch, np.random.default_rng(0))))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
     done = restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):

@@ -78,7 +78,6 @@ def _end_of(child: "subprocess.Popen[bytes]") -> str:
 
 
 def _started() -> "subprocess.Popen[bytes]":
-    """A child that waits for its input."""
     root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
     try:

@@ -6,6 +6,7 @@ parallel.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -147,21 +148,16 @@ class Trial:
 
 def cohort_plan(participants: int = 34) -> Iterator[Trial]:
     """The cohort's trials in order: participant, gesture, speed, inclination (34 x 10 x 3 x 3 = 3060)."""
-    index = 0
-    for person in range(participants):
-        for gesture in GESTURES:
-            for speed in SPEEDS:
-                for inclination in INCLINATIONS:
-                    yield Trial(index, person, gesture, speed, inclination)
-                    index += 1
+    cells = product(range(participants), GESTURES, SPEEDS, INCLINATIONS)
+    return (Trial(index, *cell) for index, cell in enumerate(cells))
 
 
 def cohort_take(trial: Trial, seed: int = 0) -> Take:
     """One trial of the cohort, on the nominal sensor on that participant's day; needs no other trial."""
     rng = generator(seed, 0xC0, trial.index)
-    person = Participant(_person(seed, trial.participant))
-    sensor = SimulatedSensor.nominal(day=_person(seed, trial.participant))
-    return gesture_take(trial.gesture, person, sensor, rng, trial.speed, trial.inclination)
+    person = seed * 1000 + trial.participant
+    sensor = SimulatedSensor.nominal(day=person)
+    return gesture_take(trial.gesture, Participant(person), sensor, rng, trial.speed, trial.inclination)
 
 
 @dataclass(frozen=True)
@@ -198,8 +194,3 @@ def wide(seed: int, index: int, hardness: float | None = None) -> Take:
     return gesture_take(
         plan.kind, plan.participant, plan.sensor, plan.rng, plan.speed, plan.inclination, hurry=plan.hurry
     )
-
-
-def _person(seed: int, number: int) -> int:
-    """The seed of participant `number` of cohort `seed`."""
-    return seed * 1000 + number

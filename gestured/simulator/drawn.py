@@ -1,6 +1,7 @@
 """Lines drawn with one finger that are none of the ten gestures."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,18 +22,14 @@ def drawn(occasion: Occasion, t: Array, x: Array, y: Array) -> list[Press]:
 
 
 def _turned(points: list[tuple[float, float]], angle: float) -> list[tuple[float, float]]:
-    """Points turned about the origin."""
     return [turned(x, y, angle) for x, y in points]
-
-
-def _leg_s(occasion: Occasion, length: float) -> float:
-    """The duration in seconds of one leg of `length` millimetres."""
-    return float(np.clip(0.3 * (length / 40.0) ** 0.4 / occasion.rate * occasion.rng.lognormal(0.0, 0.15), 0.11, 0.9))
 
 
 def _legs(occasion: Occasion, points: list[tuple[float, float]], overlap: float, pause_s: float = 0.0) -> list[Press]:
     """One finger through via points (mm), with legs that overlap or pause as in `polyline`."""
-    legs = [_leg_s(occasion, math.dist(a, b)) for a, b in zip(points[:-1], points[1:], strict=True)]
+    lengths = [math.dist(a, b) for a, b in pairwise(points)]
+    usual = [0.3 * (length / 40.0) ** 0.4 / occasion.rate for length in lengths]  # s for each leg, but for chance
+    legs = [float(np.clip(leg_s * occasion.rng.lognormal(0.0, 0.15), 0.11, 0.9)) for leg_s in usual]
     t, x, y = polyline(points, legs, overlap, pause_s)
     return drawn(occasion, t, x, y)
 

@@ -25,17 +25,9 @@ def slow_touch(occasion: Occasion) -> list[Press]:
     x, y = occasion.spot(3.0, 3.0)
     t = grid(rng.uniform(0.9, 2.6))
     drift = rng.normal(0.0, 2.0, 2)
-    half = 0.48 * float(t[-1])
-    return [
-        occasion.finger(
-            t,
-            x + drift[0] * t,
-            y + drift[1] * t,
-            force=rng.uniform(0.2, 0.7),
-            fade_in_s=half,
-            fade_out_s=half,
-        )
-    ]
+    half, force = 0.48 * float(t[-1]), rng.uniform(0.2, 0.7)
+    x_of_t, y_of_t = x + drift[0] * t, y + drift[1] * t
+    return [occasion.finger(t, x_of_t, y_of_t, force=force, fade_in_s=half, fade_out_s=half)]
 
 
 def diagonal_swipe(occasion: Occasion) -> list[Press]:

@@ -111,11 +111,8 @@ class Participant:
         rng = generator(self.seed, 0x905E, inclination)
         step = inclination - 1
         turn = float(rng.normal(0.0, math.radians(3.0))) + step * math.radians(2.0) * (1 if self.right_handed else -1)
-        return (
-            turn,
-            float(rng.uniform(0.85, 1.1)) - 0.04 * step,
-            float(rng.lognormal(0.0, 0.12)) * (1.0 - 0.1 * step),
-        )
+        grow = float(rng.uniform(0.85, 1.1)) - 0.04 * step
+        return turn, grow, float(rng.lognormal(0.0, 0.12)) * (1.0 - 0.1 * step)
 
     def rate(self, rng: np.random.Generator, speed: str) -> float:
         """The factor on the speed of one movement: from habit, the intended `speed` and chance."""

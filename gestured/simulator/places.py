@@ -16,12 +16,8 @@ from gestured.simulator.unmeant import SHORT, Places
 
 # What the fingers of a resting hand do: times an hour of rest; assumed.
 FINGERS: Mapping[str, float] = {
-    "playing_tap": 240.0,
-    "playing_drum": 60.0,
-    "playing_rub": 90.0,
-    "playing_press": 40.0,
-    "playing_stretch": 40.0,
-}
+    "playing_tap": 240.0, "playing_drum": 60.0, "playing_rub": 90.0, "playing_press": 40.0, "playing_stretch": 40.0,
+}  # fmt: skip
 HAPPENINGS: Mapping[str, Maker] = {"idle_tap": one_tap, **SHORT}
 # Makes something that rests, from an occasion, the seconds and the road: its presses, and where its fingers lie (mm).
 Resting = Callable[[Occasion, float, float], tuple[list[Press], Places]]
@@ -45,66 +41,32 @@ class Place:
 
 # What may happen anywhere: times an hour; all assumed.
 ANYWHERE: Mapping[str, float] = {
-    "sleeve_brush": 15.0,
-    "bump": 20.0,
-    "graze": 20.0,
-    "landing": 12.0,
-    "pat": 5.0,
-    "poke": 3.0,
-    "slide": 3.0,
-    "fold": 6.0,
-    "fidget": 6.0,
-    "hands": 1.5,
-    "wipe": 2.0,
-    "palm": 3.0,
-    "object_put_down": 3.0,
-    "wrinkle": 3.0,
-    "long_press": 2.0,
-    "press_and_slide": 1.0,
+    "sleeve_brush": 15.0, "bump": 20.0, "graze": 20.0, "landing": 12.0, "pat": 5.0, "poke": 3.0, "slide": 3.0,
+    "fold": 6.0, "fidget": 6.0, "hands": 1.5, "wipe": 2.0, "palm": 3.0, "object_put_down": 3.0, "wrinkle": 3.0,
+    "long_press": 2.0, "press_and_slide": 1.0,
     "idle_tap": 8.0,  # only while nothing rests there; the fingers of a resting hand tap as FINGERS says
-}
-PLACES: Mapping[str, Place] = {
-    "armrest": Place(
-        "armrest",
-        {NOBODY: 3.0, "forearm": 3.0, "elbow": 1.5, HAND: 1.5, "push_off": 0.5},
-        {**ANYWHERE, "sleeve_brush": 30.0},
-        0.06,
-        45.0,
+}  # fmt: skip
+_PLACES = (
+    Place(
+        "armrest", {NOBODY: 3.0, "forearm": 3.0, "elbow": 1.5, HAND: 1.5, "push_off": 0.5},
+        {**ANYWHERE, "sleeve_brush": 30.0}, 0.06, 45.0,
     ),
-    "door": Place(
-        "door",
-        {NOBODY: 4.0, "elbow": 3.0, "forearm": 2.0, "push_off": 1.0, HAND: 1.0},
-        {**ANYWHERE, "sleeve_brush": 30.0, "bump": 30.0, "palm": 6.0},
-        0.09,
-        45.0,
+    Place(
+        "door", {NOBODY: 4.0, "elbow": 3.0, "forearm": 2.0, "push_off": 1.0, HAND: 1.0},
+        {**ANYWHERE, "sleeve_brush": 30.0, "bump": 30.0, "palm": 6.0}, 0.09, 45.0,
     ),
-    "seat": Place(
-        "seat",
-        {"body": 6.0, NOBODY: 1.0, HAND: 0.5, THING: 1.0},
-        {**ANYWHERE, "wrinkle": 25.0, "fold": 20.0, "idle_tap": 4.0, "fidget": 3.0},
-        0.12,
-        20.0,
+    Place(
+        "seat", {"body": 6.0, NOBODY: 1.0, HAND: 0.5, THING: 1.0},
+        {**ANYWHERE, "wrinkle": 25.0, "fold": 20.0, "idle_tap": 4.0, "fidget": 3.0}, 0.12, 20.0,
     ),
-    "skin": Place(
-        "skin",
-        {NOBODY: 6.0, HAND: 1.5, "body": 0.5},
-        {**ANYWHERE, "palm": 10.0, "pat": 12.0, "hands": 6.0, "idle_tap": 12.0},
-        0.02,
-        90.0,
+    Place(
+        "skin", {NOBODY: 6.0, HAND: 1.5, "body": 0.5},
+        {**ANYWHERE, "palm": 10.0, "pat": 12.0, "hands": 6.0, "idle_tap": 12.0}, 0.02, 90.0,
     ),
-    "table": Place(
-        "table",
-        {NOBODY: 4.0, "forearm": 2.0, HAND: 2.0, THING: 3.0},
-        {
-            **ANYWHERE,
-            "object_put_down": 15.0,
-            "slide": 20.0,
-            "poke": 6.0,
-            "wipe": 6.0,
-            "fidget": 12.0,
-            "idle_tap": 12.0,
-        },
-        0.0,
-        60.0,
+    Place(
+        "table", {NOBODY: 4.0, "forearm": 2.0, HAND: 2.0, THING: 3.0},
+        {**ANYWHERE, "object_put_down": 15.0, "slide": 20.0, "poke": 6.0, "wipe": 6.0, "fidget": 12.0,
+         "idle_tap": 12.0}, 0.0, 60.0,
     ),
-}
+)  # fmt: skip
+PLACES: Mapping[str, Place] = {place.name: place for place in _PLACES}

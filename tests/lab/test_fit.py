@@ -106,7 +106,7 @@ def test_weights_survive_the_file(samples: Samples, tmp_path: Path) -> None:
 def test_every_sample_is_learned_from_once_an_epoch(samples: Samples) -> None:
     chosen = np.flatnonzero(targets(samples) >= 0)
     for seed in range(3):
-        plan = list(fit._plan(samples, SMALL, np.random.default_rng(seed), chosen))
+        plan = list(fit.similar(samples, chosen, SMALL.batch, np.random.default_rng(seed)))
         assert sorted(np.concatenate(plan).tolist()) == chosen.tolist()
         assert max(map(len, plan)) <= SMALL.batch
 

@@ -115,7 +115,6 @@ class Contacts:
 
 
 def _numbers(sample: object) -> list[float]:
-    """The six numbers of a sample."""
     if isinstance(sample, list) and len(sample) == 6 and all(type(n) in (int, float) for n in sample):
         numbers = [float(n) for n in sample]  # an integer of too many digits is an OverflowError
         if all(map(math.isfinite, numbers)) and abs(numbers[0]) < 1 << 53:

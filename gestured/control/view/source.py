@@ -134,7 +134,6 @@ class Source:
             raise Unreachable(f"the daemon on {self._control} {said}") from None
 
     def _pass_on(self, line: dict[str, Any]) -> None:
-        """Put a line of the daemon into the outboxes that it is for."""
         kind = line["type"]
         if kind in ("view", "provisional", "touch"):  # for those who look at this sensor
             if kind == "view":

@@ -17,7 +17,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.fit import LONGEST, optimiser_of, padded, step
+from gestured.lab.fit import LONGEST, optimiser_of, padded, similar, step
 from gestured.lab.nets import SCALE, last_active
 from gestured.lab.samples import Samples
 
@@ -115,10 +115,7 @@ class Windows:
 
     def order(self, index: Indices, rng: np.random.Generator) -> Indices:
         """`index` in random order, but so that neighbours are of similar length."""
-        lengths = self.samples.lengths()
-        mixed = rng.permutation(index)
-        pools = [mixed[i : i + 20 * BATCH_SEQUENCES] for i in range(0, len(mixed), 20 * BATCH_SEQUENCES)]
-        return np.concatenate([pool[np.argsort(lengths[pool] + 3 * rng.random(len(pool)))] for pool in pools])
+        return np.concatenate(list(similar(self.samples, index, BATCH_SEQUENCES, rng)))
 
 
 @dataclass(frozen=True)
