@@ -27,33 +27,24 @@ RUBBISH = 100  # bad lines in a row after which a client is cut off; with TURNS 
 Finger = tuple[str, int, int]  # sensor, id of the contact, number of the finger
 
 
-class Server(Protocol):
-    """What a client needs of the server that it belongs to."""
+class _Server(Protocol):
+    """What a client needs of the server that it belongs to, an `EventServer`, which says what each does."""
 
     loop: asyncio.AbstractEventLoop
     metrics: Metrics
     known: Callable[[], Mapping[str, Collection[str]]]  # `types`, `gestures`, `zones` that a client may name
 
-    def subscribe(self, client: "Client", subscription: Subscription) -> None:
-        """Change a client's subscription."""
-
-    def queue(self, client: "Client") -> None:
-        """Call `answer` of a client when it is its turn."""
-
-    def check(self, client: "Client") -> None:
-        """Remove a client that has hung up unnoticed."""
-
-    def cut_off(self, client: "Client", reason: str) -> None:
-        """Remove a client that misuses its connection; log the reason."""
-
-    def remove(self, client: "Client") -> None:
-        """Forget a client that is gone."""
+    def subscribe(self, client: "Client", subscription: Subscription) -> None: ...
+    def queue(self, client: "Client") -> None: ...
+    def check(self, client: "Client") -> None: ...
+    def cut_off(self, client: "Client", reason: str) -> None: ...
+    def remove(self, client: "Client") -> None: ...
 
 
 class Client:
     """One connection: a socket, its subscription, and the lines that wait for it."""
 
-    def __init__(self, server: Server, sock: socket.socket) -> None:
+    def __init__(self, server: _Server, sock: socket.socket) -> None:
         self._server, self.sock = server, sock
         self.subscription = Subscription()
         self.blocked_since: float | None = None  # monotonic s, since when its socket takes no bytes
