@@ -87,18 +87,10 @@ def _two(occasion: Occasion, distance: tuple[float, float], turn: float) -> list
     shift = rng.normal(0.0, 0.04, 2) * occasion.small
     xs = np.concatenate([2 * lean * dx, -2 * (1 - lean) * dx]) + shift[0] * np.concatenate([s, s])
     ys = np.concatenate([2 * lean * dy, -2 * (1 - lean) * dy]) + shift[1] * np.concatenate([s, s])
-    xs, ys = occasion.settle(xs, ys)
-    n = t.size
+    ways = zip(*(np.split(moved, 2) for moved in occasion.settle(xs, ys)), strict=True)
     return [
-        occasion.finger(
-            t,
-            xs[k * n : (k + 1) * n],
-            ys[k * n : (k + 1) * n],
-            size=1.0 + 0.2 * k,
-            force=rng.uniform(0.6, 1.1),
-            start=k * rng.uniform(0.0, 0.05),
-        )
-        for k in range(2)
+        occasion.finger(t, x, y, size=1.0 + 0.2 * k, force=rng.uniform(0.6, 1.1), start=k * rng.uniform(0.0, 0.05))
+        for k, (x, y) in enumerate(ways)
     ]
 
 

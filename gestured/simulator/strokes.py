@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -20,16 +21,9 @@ def touch_down(
     u = t / duration_s
     roll = np.multiply.outer(u - 0.5, np.clip(rng.normal(0.0, 1.9, 2), -4.5, 4.5))
     roll += np.multiply.outer(np.sin(math.pi * u), rng.normal(0.0, 0.8, 2))
-    edge = 0.5 * duration_s
-    return occasion.finger(
-        t,
-        x + roll[:, 0],
-        y + roll[:, 1],
-        force=force,
-        start=start,
-        fade_in_s=min(rng.uniform(0.015, 0.09), edge),
-        fade_out_s=min(rng.uniform(0.02, 0.11), edge),
-    )
+    x_then, y_then, edge = x + roll[:, 0], y + roll[:, 1], 0.5 * duration_s
+    come, go = min(rng.uniform(0.015, 0.09), edge), min(rng.uniform(0.02, 0.11), edge)
+    return occasion.finger(t, x_then, y_then, force=force, start=start, fade_in_s=come, fade_out_s=go)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,16 +79,15 @@ def swipe_length(occasion: Occasion, heading: float) -> float:
 
 def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float) -> list[Press]:
     """One finger on a stroke, or several side by side, uneven in force, size, length, landing and lifting."""
-    rng = occasion.rng
+    rng, finger = occasion.rng, partial(occasion.finger, fade_in_s=path.fade_in_s, fade_out_s=path.fade_out_s)
     if count == 1:
-        x, y = occasion.settle(path.x, path.y)
-        return [occasion.finger(path.t, x, y, fade_in_s=path.fade_in_s, fade_out_s=path.fade_out_s)]
+        return [finger(path.t, *occasion.settle(path.x, path.y))]
     gap = min(occasion.spacing(), 0.8 * occasion.small / (count - 1))
     side = heading + math.pi / 2 + float(np.clip(rng.normal(0.0, 0.25), -0.6, 0.6))
     offsets = (np.arange(count) - (count - 1) / 2) * gap * rng.uniform(0.9, 1.1, count)
     xs = [path.x * rng.uniform(0.9, 1.08) + o * math.cos(side) for o in offsets]
     ys = [path.y * rng.uniform(0.9, 1.08) + o * math.sin(side) for o in offsets]
-    all_x, all_y = occasion.settle(np.concatenate(xs), np.concatenate(ys))
+    xs, ys = (np.split(moved, count) for moved in occasion.settle(np.concatenate(xs), np.concatenate(ys)))
     total = float(path.t[-1])
     delay_s = min(0.08, 0.25 * total)
     forces = rng.uniform(0.35, 1.0, count) if rng.random() < 0.3 else rng.uniform(0.7, 1.0, count)
@@ -104,19 +97,7 @@ def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float) -> 
         first = rng.uniform(0.0, delay_s) if k else 0.0
         last = rng.uniform(0.0, delay_s)
         t = grid(total - first - last)
-        n = path.t.size
-        x = np.interp(t + first, path.t, all_x[k * n : (k + 1) * n])
-        y = np.interp(t + first, path.t, all_y[k * n : (k + 1) * n])
-        contacts.append(
-            occasion.finger(
-                t,
-                x,
-                y,
-                force=float(forces[k]),
-                size=float(rng.uniform(0.85, 1.12)),
-                start=first,
-                fade_in_s=path.fade_in_s,
-                fade_out_s=path.fade_out_s,
-            )
-        )
+        x, y = (np.interp(t + first, path.t, way[k]) for way in (xs, ys))
+        size = float(rng.uniform(0.85, 1.12))
+        contacts.append(finger(t, x, y, force=float(forces[k]), size=size, start=first))
     return contacts

@@ -190,9 +190,8 @@ def playing_rub(occasion: Occasion, places: Places) -> list[Press]:
     some = places if rng.random() < 0.5 else [places[int(rng.integers(len(places)))]]
     made = []
     for x, y in some:
-        level = even(occasion, 0.1, 1.0) * np.clip(
-            1.0 + float(rng.uniform(0.0, 1.0)) * wander(t, rng, 0.3, 3.0), 0.0, 3.0
-        )
+        force, unrest = even(occasion, 0.1, 1.0), float(rng.uniform(0.0, 1.0))
+        level = force * np.clip(1.0 + unrest * wander(t, rng, 0.3, 3.0), 0.0, 3.0)
         press = occasion.finger(t, x + dx, y + dy)
         made.append(replace(press, force=press.force * level))
     return made

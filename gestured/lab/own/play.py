@@ -159,16 +159,8 @@ def repeated(plan: Performance, rng: np.random.Generator, extent: tuple[float, f
         x = at_x + c * dx - s * dy + off_x + 0.03 * size * wander(t - t[0], rng, 0.3, 1.5, 3)
         y = at_y + s * dx + c * dy + off_y + 0.03 * size * wander(t - t[0], rng, 0.3, 1.5, 3)
         broad = rng.lognormal(0.0, 0.08)
-        contacts.append(
-            replace(
-                contact,
-                t=t,
-                x=np.clip(x, 0.0, extent[0]),
-                y=np.clip(y, 0.0, extent[1]),
-                force=contact.force * force * rng.lognormal(0.0, 0.05),
-                length=contact.length * broad,
-                width=contact.width * broad,
-                angle=contact.angle + float(rng.normal(0.0, 0.15)),
-            )
-        )
+        pressed, angle = contact.force * force * rng.lognormal(0.0, 0.05), contact.angle + float(rng.normal(0.0, 0.15))
+        x, y = np.clip(x, 0.0, extent[0]), np.clip(y, 0.0, extent[1])
+        length, width = contact.length * broad, contact.width * broad
+        contacts.append(replace(contact, t=t, x=x, y=y, force=pressed, length=length, width=width, angle=angle))
     return replace(plan, contacts=tuple(contacts), duration_s=plan.duration_s * tempo)
