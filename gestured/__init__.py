@@ -50,38 +50,29 @@ __all__ = [
     "open",
 ]
 
+# The module of each name; all others are those of events.
 _HOMES = {
-    "client.subscriber": ("Subscriber",),
-    "core.errors": ("GesturedError",),
-    "core.events": (
-        "Cancelled",
-        "Event",
-        "Gate",
-        "Gesture",
-        "Onset",
-        "Provisional",
-        "Release",
-        "Status",
-        "TouchEvent",
-        "Unknown",
-    ),
-    "core.frames": ("Frame", "Touch"),
-    "core.hub": ("Hub",),
-    "core.scene": ("Scene",),
-    "core.sensor": ("Recognizer", "Sensor"),
-    "model.embedded": ("Embedded", "open"),
+    "Embedded": "model.embedded",
+    "Frame": "core.frames",
+    "GesturedError": "core.errors",
+    "Hub": "core.hub",
+    "Recognizer": "core.sensor",
+    "Scene": "core.scene",
+    "Sensor": "core.sensor",
+    "Subscriber": "client.subscriber",
+    "Touch": "core.frames",
+    "open": "model.embedded",
 }
 
 
 def __getattr__(name: str) -> object:
     from importlib import import_module
 
-    for home, names in _HOMES.items():
-        if name in names:
-            found: object = getattr(import_module(f"gestured.{home}"), name)
-            globals()[name] = found
-            return found
-    raise AttributeError(f"module 'gestured' has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module 'gestured' has no attribute {name!r}")
+    found: object = getattr(import_module(f"gestured.{_HOMES.get(name, 'core.events')}"), name)
+    globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from multiprocessing.pool import IMapIterator
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -106,9 +107,7 @@ def from_take(take: Take) -> list[Sample]:
 
 
 TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
-OTHER_TRIALS = tuple(
-    (p, k, s) for p in range(34) for k in NON_GESTURES for s in SPEEDS
-)  # non-gestures of the same people
+OTHER_TRIALS = tuple(product(range(34), NON_GESTURES, SPEEDS))  # non-gestures of the same people
 
 
 def from_day(life: Day) -> list[Sample]:
@@ -162,10 +161,8 @@ def _others(seed: int, index: int) -> list[Sample]:
     number, kind, speed = OTHER_TRIALS[index]
     person = seed * 1000 + number
     rng = generator(seed, 0x07, index)
-    take = gesture_take(
-        kind, Participant(person), SimulatedSensor.nominal(day=person), rng, speed, int(rng.integers(3))
-    )
-    return from_take(take)
+    sensor, inclination = SimulatedSensor.nominal(day=person), int(rng.integers(3))
+    return from_take(gesture_take(kind, Participant(person), sensor, rng, speed, inclination))
 
 
 def _cohort(seed: int, index: int) -> list[Sample]:
