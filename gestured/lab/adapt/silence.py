@@ -55,29 +55,24 @@ class Lived:
 
 def own_hours(paths: Sequence[Path], grid: tuple[int, ...]) -> Lived:
     """Read and cut tapes. Raises RecordingError or GesturedError if nothing can be learned from them."""
-    found: list[tuple[list[Sample], list[float], float]] = []
-    for path in paths:
-        contacts, places, seconds = list[Sample](), list[float](), 0.0
+    contacts, places, seconds = list[Sample](), list[float](), [0.0] * len(paths)
+    for n, path in enumerate(paths):
         for life in recorded(path):  # one person may touch all its sensors at once, so they are one unit
             assert life.setup.grid is not None
             if life.setup.grid != grid:
                 here, others = ("x".join(map(str, shape)) for shape in (life.setup.grid, grid))
                 raise RecordingError(f"{path}: expected the grid {others} of the recordings, found {here}")
             more, onsets, lasted = _contacts(life)
-            contacts += more
+            contacts += [one._replace(person=n) for one in more]
             places += (onsets * GROUPS / max(lasted, 1.0)).tolist()
-            seconds += lasted
-        found.append((contacts, places, seconds))
+            seconds[n] += lasted
     unit = "tapes"
-    if len(found) == 1:
-        unit, (contacts, places, seconds) = "parts of one tape", found[0]
+    if len(paths) == 1:
+        unit, seconds = "parts of one tape", [seconds[0] / GROUPS] * GROUPS
         parts = [min(int(place), GROUPS - 1) for place in places]
-        found = [
-            ([one for one, of in zip(contacts, parts, strict=True) if of == k], [], seconds / GROUPS)
-            for k in range(GROUPS)
-        ]
-    hours = np.array([seconds for _, _, seconds in found]) / HOUR_S
-    samples = collect(one._replace(person=n) for n, (contacts, _, _) in enumerate(found) for one in contacts)
+        contacts = [one._replace(person=part) for one, part in zip(contacts, parts, strict=True)]
+    hours = np.array(seconds) / HOUR_S
+    samples = collect(sorted(contacts, key=lambda one: one.person))
     if hours.sum() < LEAST_HOURS or len(samples) < FEWEST:
         raise GesturedError(
             f"{', '.join(map(str, paths))}: expected at least {LEAST_HOURS:g} h of tapes with {FEWEST} contacts in "

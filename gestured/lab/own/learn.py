@@ -24,9 +24,8 @@ from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.model.prototypes import Array, Prototype, Space
 
-ACCEPTED = (
-    0.015  # share of other non-gestures that a threshold lets through in simulation, below the 0.02 that is promised
-)
+# Share of other non-gestures that a threshold lets through in simulation, below the 0.02 that is promised.
+ACCEPTED = 0.015
 TAKEN = 0.003  # share of the model's gestures that may be taken for one own gesture in simulation
 DIRECTIONS = 64  # the most directions of the embedding that are kept
 TELLING = 0.05  # variance between gestures over that within one; a direction with less is dropped
