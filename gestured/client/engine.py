@@ -2,11 +2,11 @@
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
 from typing import Any
 
 import gestured
@@ -42,7 +42,7 @@ class Engine:
             self.close()
             raise
 
-    def _start(self, folder: Path, model: str, grid: str, more: Sequence[str]) -> "subprocess.Popen[bytes]":
+    def _start(self, folder: Path, model: str, grid: str, more: Sequence[str]) -> "Popen[bytes]":
         command = [*child_of_ours("gestured.daemon"), "--model", model, "--listen", "127.0.0.1:0"]
         command += ["--socket", str(folder / "events.sock"), "--grid", grid]
         command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # the user's would change answers
@@ -50,14 +50,7 @@ class Engine:
         self._log = folder / "log"
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C is for us, and we end it in our own time.
-            return subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                env=environment,
-                start_new_session=True,
-            )
+            return Popen(command, stdin=DEVNULL, stdout=PIPE, stderr=log, env=environment, start_new_session=True)
 
     def _wait(self) -> dict[str, Any]:
         assert self._process.stdout is not None
@@ -90,7 +83,7 @@ class Engine:
         self._process.terminate()
         try:
             self._process.wait(STOP_S)
-        except subprocess.TimeoutExpired:
+        except TimeoutExpired:
             self._process.kill()
             self._process.wait()
         if self._process.stdout:

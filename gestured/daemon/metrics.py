@@ -79,45 +79,27 @@ class Metrics:
     def __init__(self) -> None:
         self.frames = Counter("gestured_frames", "Frames by what became of them", "sensor", "result")
         self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason", dated=True)
-        self.implausible = Counter(
-            "gestured_implausible_time_tags", "Time tags replaced by the arrival time", dated=True
-        )
+        text = "Time tags replaced by the arrival time"
+        self.implausible = Counter("gestured_implausible_time_tags", text, dated=True)
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
-        self.zones = Counter(
-            "gestured_zone_gestures",
-            "Recognised gestures by the zone they began in",
-            "sensor",
-            "zone",
-            most=NAMED_ZONES,
-        )
+        text = "Recognised gestures by the zone they began in"
+        self.zones = Counter("gestured_zone_gestures", text, "sensor", "zone", most=NAMED_ZONES)
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
-        self.suppressed = Counter(
-            "gestured_suppressed",
-            "Segments that did not count, by the gates that were closed",
-            "reason",
-            "gate",
-            most=NAMED_GATES,
-        )
+        text = "Segments that did not count, by the gates that were closed"
+        self.suppressed = Counter("gestured_suppressed", text, "reason", "gate", most=NAMED_GATES)
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason", zeros=("model",))
         self.provisional = Counter("gestured_provisional", "Provisional events by what became of them", "result")
-        self.lead = Histogram(
-            "gestured_provisional_lead_seconds", "From a provisional event that was confirmed to its answer", LEAD_S
-        )
+        text = "From a provisional event that was confirmed to its answer"
+        self.lead = Histogram("gestured_provisional_lead_seconds", text, LEAD_S)
         self.internal_errors = Counter("gestured_internal_errors", "Bugs that were caught", dated=True)
         self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
-        self.reloads = Counter(
-            "gestured_reloads", "Reloads of model and configuration", "result", dated=True, zeros=("refused",)
-        )
+        text = "Reloads of model and configuration"
+        self.reloads = Counter("gestured_reloads", text, "result", dated=True, zeros=("refused",))
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result", dated=True)
         self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get", dated=True)
         self.evicted = Counter("gestured_clients_evicted", "Clients cut off or turned away", "reason", dated=True)
-        self.inference = Histogram(
-            "gestured_inference_seconds",
-            "Time to classify a segment that was decided",
-            INFERENCE_S,
-            "model",
-            most=NAMED_MODELS,
-        )
+        text = "Time to classify a segment that was decided"
+        self.inference = Histogram("gestured_inference_seconds", text, INFERENCE_S, "model", most=NAMED_MODELS)
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
         self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets so far, and monotonic s when more were dropped

@@ -26,11 +26,8 @@ from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # the classes of real non-gestures
-CLASSES: list[str] = [
-    *GESTURES,
-    *NON_GESTURES,
-    EVERYDAY,
-]  # non-gestures are classes of their own, which improves rejection
+# Non-gestures are classes of their own, which improves rejection.
+CLASSES: list[str] = [*GESTURES, *NON_GESTURES, EVERYDAY]
 LONGEST = 80  # frames that a network is shown: five seconds and their context
 
 
@@ -176,9 +173,8 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
     done = restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):
-        one_epoch(
-            nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}"
-        )
+        title = f"epoch {epoch + 1}/{config.epochs}"
+        one_epoch(nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, title)
         store(checkpoint, nets, optimiser, epoch + 1)
     return nets
 
@@ -208,9 +204,8 @@ def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: Fi
             (simulated, labels, rng.choice(usable, count, replace=False)),
             (real, real_labels, balanced(real_labels, real_usable, real_count, rng)),
         ]
-        one_epoch(
-            nets, optimiser, schedule, sets, config, 1000 + epoch, f"{title}, real {epoch + 1}/{config.real_epochs}"
-        )
+        told = f"{title}, real {epoch + 1}/{config.real_epochs}"
+        one_epoch(nets, optimiser, schedule, sets, config, 1000 + epoch, told)
     return nets
 
 

@@ -28,9 +28,8 @@ def join_recordings(parts: Sequence[Recordings]) -> Recordings:
     joined: dict[str, Any] = {}
     for field in (field.name for field in fields(Recordings)):
         known = [getattr(part, field) for part in parts]
-        if field == "offsets" or all(value is None for value in known):
-            continue
-        if field in TOGETHER and any(value is None for value in known):
+        lack = [value is None for value in known]
+        if field == "offsets" or all(lack) or (field in TOGETHER and any(lack)):
             continue
         if field not in EVENT_FIELDS:
             known = [

@@ -99,14 +99,13 @@ def shifts(window: NDArray[np.floating], threshold: float = THRESHOLD) -> list[t
 
 def shifted(window: NDArray[np.floating], rows: int, columns: int) -> NDArray[np.floating]:
     """A window (T, R, C) moved by whole taxels; what leaves the sensor is lost, what comes in is zero."""
-    out = np.zeros_like(window)
+
+    def span(size: int, by: int) -> slice:
+        return slice(max(by, 0), size + min(by, 0))
+
     height, width = window.shape[1:]
-    to_rows, to_columns = slice(max(rows, 0), height + min(rows, 0)), slice(max(columns, 0), width + min(columns, 0))
-    from_rows, from_columns = (
-        slice(max(-rows, 0), height - max(rows, 0)),
-        slice(max(-columns, 0), width - max(columns, 0)),
-    )
-    out[:, to_rows, to_columns] = window[:, from_rows, from_columns]
+    out = np.zeros_like(window)
+    out[:, span(height, rows), span(width, columns)] = window[:, span(height, -rows), span(width, -columns)]
     return out
 
 

@@ -5,7 +5,7 @@ the networks the paper gives the layers and the LSTM's width, the rest is ours. 
 Feature vectors are standardised over the training set before KNN and SVM, which the paper leaves open.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -23,17 +23,7 @@ from torch import nn
 
 from gestured.lab.study import views
 from gestured.lab.study.training import HistoryNet, Indices, Inputs, Net, SequenceNet, train_net
-from gestured.lab.study.views import (
-    FRAMES,
-    TAXELS,
-    TOUCHES,
-    TRAJECTORIES,
-    WAVELET,
-    WAVELET_LEVEL,
-    WAVELETS,
-    Values,
-    View,
-)
+from gestured.lab.study.views import Values, View
 
 
 @dataclass(frozen=True)
@@ -79,6 +69,10 @@ def _estimate(
     return Estimator(build(values, seed).fit(inputs[index], labels[index]), classes)
 
 
+# From inputs, the chosen ones, labels, the number of classes, hyperparameters and a seed.
+Fit = Callable[[Any, Indices, Indices, int, Values, int], Estimator | Net]
+
+
 @dataclass(frozen=True)
 class Method:
     """A way to tell gestures apart."""
@@ -86,9 +80,7 @@ class Method:
     id: str
     title: str
     view: View
-    fit: Callable[
-        [Any, Indices, Indices, int, Values, int], Estimator | Net
-    ]  # inputs, chosen, labels, classes, values, seed
+    fit: Fit
     grid: tuple[Values, ...]  # candidates for tuning, whole sets of hyperparameters
     paper: Mapping[str, Values] | None  # by augmentation; None beyond the paper
     published: Mapping[str, float]  # the paper's share right, by augmentation
@@ -103,12 +95,9 @@ class Method:
 KINDS = {
     "knn": ("k nearest neighbours", _nearest, [{"neighbours": k} for k in (1, 4, 7, 15)]),
     "rf": ("random forest", _forest, [{"trees": 200, "depth": d} for d in (9, 14, 20)]),
-    "svm": (
-        "support vector machine (RBF)",
-        _vectors,
-        [{"log2_c": c, "log2_gamma": g} for c in (3, 7, 11) for g in (-11, -8, -5)],
-    ),
-}
+    "svm": ("support vector machine (RBF)", _vectors,
+            [{"log2_c": c, "log2_gamma": g} for c in (3, 7, 11) for g in (-11, -8, -5)]),
+}  # fmt: skip
 FOREST = {"trees": 200, "depth": 9}
 
 
@@ -116,27 +105,20 @@ def _classical(
     prefix: str, family: str, view: View, given: Values,
     variants: tuple[Values, ...], settings: Mapping[str, tuple[Values, Values]],
     published: Mapping[str, tuple[float, float]],
-) -> list[Method]:  # fmt: skip
+) -> Iterator[Method]:  # fmt: skip
     """KNN, forest and SVM on one set of features."""
-    out = []
     for kind, (title, build, grid) in KINDS.items():
         plain, augmented = settings[kind]
-        out.append(
-            Method(
-                f"{prefix}_{kind}",
-                f"{family}, {title}",
-                view,
-                partial(_estimate, build),
-                tuple({**v, **g} for v in variants for g in grid),
-                {"none": {**given, **plain}, "shift": {**given, **augmented}},
-                dict(zip(("none", "shift"), published[kind], strict=True)),
-                published_online=0.71 if (prefix, kind) == ("tp", "rf") else None,
-            )  # fmt: skip
-        )
-    return out
+        yield Method(
+            f"{prefix}_{kind}", f"{family}, {title}", view, partial(_estimate, build),
+            tuple({**v, **g} for v in variants for g in grid),
+            {"none": {**given, **plain}, "shift": {**given, **augmented}},
+            dict(zip(("none", "shift"), published[kind], strict=True)),
+            published_online=0.71 if (prefix, kind) == ("tp", "rf") else None,
+        )  # fmt: skip
 
 
-HAAR = {"wavelet": WAVELET, "level": WAVELET_LEVEL, "reading": TAXELS}
+HAAR = {"wavelet": views.WAVELET, "level": views.WAVELET_LEVEL, "reading": views.TAXELS}
 TRAINING_STEPS = 800  # batches
 
 
@@ -152,7 +134,7 @@ def _net(
         return SequenceNet(kind, values["units"], classes, values.get("channels", 0))
 
     return Method(
-        kind, title, FRAMES, partial(_train, make), tuple(grid),
+        kind, title, views.FRAMES, partial(_train, make), tuple(grid),
         dict.fromkeys(("none", "shift"), given) if published else None,
         {"none": published[0], "shift": published[1]} if published else {},
         published_online=published[2] if published else None,
@@ -169,12 +151,13 @@ def _train(
 HISTORY_GRID = [
     {"decay_s": 0.0, "channels": c, "rate": r, "steps": TRAINING_STEPS} for c, r in ((8, 4e-3), (16, 2e-3), (16, 4e-3))
 ]
+BOOSTING_GRID = tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1)))
 
 METHODS: dict[str, Method] = {
     method.id: method
     for method in [
         *_classical(
-            "st", "spatio-temporal features", WAVELETS, HAAR, (HAAR,),
+            "st", "spatio-temporal features", views.WAVELETS, HAAR, (HAAR,),
             {
                 "knn": ({"neighbours": 7}, {"neighbours": 7}),
                 "rf": (FOREST, FOREST),
@@ -183,7 +166,7 @@ METHODS: dict[str, Method] = {
             {"knn": (0.62, 0.79), "rf": (0.58, 0.96), "svm": (0.58, 0.98)},
         ),
         *_classical(
-            "tp", "touch-pattern features", TOUCHES, {"features": "paper"},
+            "tp", "touch-pattern features", views.TOUCHES, {"features": "paper"},
             ({"features": "paper"}, {"features": "daemon"}),
             {
                 "knn": ({"neighbours": 4}, {"neighbours": 1}),
@@ -202,8 +185,8 @@ METHODS: dict[str, Method] = {
         _net("cnn_lstm", "CNN-LSTM", (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
         _net("cnn_gru", "CNN-GRU", (8e-3, 4e-3), (32,), None),
         Method(
-            "trajectory_gb", "trajectory features, gradient boosting", TRAJECTORIES, partial(_estimate, _boosting),
-            tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1))), None, {},
+            "trajectory_gb", "trajectory features, gradient boosting", views.TRAJECTORIES,
+            partial(_estimate, _boosting), BOOSTING_GRID, None, {},
         ),
     ]
 }  # fmt: skip
