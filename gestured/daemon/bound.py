@@ -9,18 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gestured.client.address import control_beside, default_socket
+from gestured.daemon import sockets
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
-from gestured.daemon.sockets import (
-    AddressError,
-    Listener,
-    UnixListener,
-    bind_tcp,
-    bind_udp,
-    make_default_directory,
-    name_of,
-    stamp_arrivals,
-)
+from gestured.daemon.sockets import AddressError, Listener, UnixListener
 
 FIRST_FD = 3  # sd_listen_fds(3)
 INTERNET = (socket.AF_INET, socket.AF_INET6)
@@ -49,11 +41,11 @@ class Bound:
     def addresses(self) -> dict[str, str | None]:
         """The daemon's addresses by setting; their paths are valid in any folder."""
         return {
-            "listen": name_of(self.udp),
+            "listen": sockets.name_of(self.udp),
             "socket": _from_anywhere(self.events.path),
             "control": _from_anywhere(self.control.path),
             "gates": _from_anywhere(self.gates.path) if self.gates else None,
-            "metrics": name_of(self.http) if self.http else None,
+            "metrics": sockets.name_of(self.http) if self.http else None,
         }
 
 
@@ -69,18 +61,18 @@ def bind_all(settings: Settings) -> Bound:
         for sock in given.values():
             opened.callback(sock.close)
         if (udp := given.get("osc")) is None:
-            udp = bind_udp(settings.listen)
+            udp = sockets.bind_udp(settings.listen)
             opened.callback(udp.close)
         else:
-            stamp_arrivals(udp)
+            sockets.stamp_arrivals(udp)
         since = time.monotonic()
         if (http := given.get("metrics")) is None and settings.metrics is not None:
-            http = bind_tcp(settings.metrics)
+            http = sockets.bind_tcp(settings.metrics)
             opened.callback(http.close)
         path = settings.socket
         if path is None and "events" not in given:
             path = default_socket(os.environ)
-            make_default_directory(path.parent)
+            sockets.make_default_directory(path.parent)
         events = _listener(given, "events", path, opened, key="socket")
         path = path or events.path
         beside = settings.control or control_beside(path)
@@ -92,7 +84,7 @@ def bind_all(settings: Settings) -> Bound:
         gates = _listener(given, "gates", settings.gates, opened) if asked else None
         close = opened.pop_all().close
     for name, sock in given.items():
-        log.info("socket from systemd", name=name, address=name_of(sock))
+        log.info("socket from systemd", name=name, address=sockets.name_of(sock))
     return Bound(udp, since, events, control, gates, http, close)
 
 

@@ -50,21 +50,16 @@ class _Collector:
         self._metrics, self._status = metrics, status
 
     def collect(self) -> Iterator[Any]:
-        from prometheus_client.core import (
-            CounterMetricFamily,
-            GaugeMetricFamily,
-            HistogramMetricFamily,
-            InfoMetricFamily,
-        )
+        from prometheus_client import core
 
         for metric in vars(self._metrics).values():
             if isinstance(metric, Counter):
-                counter = CounterMetricFamily(metric.name, metric.text, labels=metric.labels)
+                counter = core.CounterMetricFamily(metric.name, metric.text, labels=metric.labels)
                 for labels, value in (dict.fromkeys(metric.zeros, 0) | metric.values).items():
                     counter.add_metric(labels, value)
                 yield counter
             elif isinstance(metric, Histogram):
-                histogram = HistogramMetricFamily(metric.name, metric.text, labels=metric.labels)
+                histogram = core.HistogramMetricFamily(metric.name, metric.text, labels=metric.labels)
                 empty = ([0] * (len(metric.bounds) + 1), [0.0])
                 for labels, (buckets, total) in (dict(metric.values) or ({} if metric.labels else {(): empty})).items():
                     bounds = [*map(str, metric.bounds), "+Inf"]
@@ -74,26 +69,27 @@ class _Collector:
         status = self._status
         for name, text, figure in _of_the_daemon(status):
             if name.endswith("_total"):
-                yield CounterMetricFamily(name.removesuffix("_total"), text, value=figure)
+                yield core.CounterMetricFamily(name.removesuffix("_total"), text, value=figure)
             else:
-                yield GaugeMetricFamily(name, text, value=figure)
+                yield core.GaugeMetricFamily(name, text, value=figure)
         labelled: dict[str, list[Status]] = {}
         for name, sensor in status["sensors"].items():
             labelled.setdefault(self._metrics.sensor_label(name), []).append(sensor)
         for name, text, together, key in _OF_SENSORS:
-            family = GaugeMetricFamily(name, text, labels=["sensor"])
+            family = core.GaugeMetricFamily(name, text, labels=["sensor"])
             for label, sensors in labelled.items():
                 family.add_metric([label], together(one[key] for one in sensors))
             yield family
-        state = GaugeMetricFamily("gestured_sensor_state", "1 for the state of a sensor", labels=["sensor", "state"])
+        text = "1 for the state of a sensor"
+        state = core.GaugeMetricFamily("gestured_sensor_state", text, labels=["sensor", "state"])
         for label, sensors in labelled.items():
             state.add_metric([label, max((one["state"] for one in sensors), key=STATES.index)], 1)
         yield state
         text = "Share of the last gestures outside of what the model was trained on"
-        shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
+        shift = core.GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
         for quantity, share in status["shift"]["outside"].items():
             shift.add_metric([quantity], share)
         yield shift
-        info = InfoMetricFamily("gestured_active_model", "The model that answers")
+        info = core.InfoMetricFamily("gestured_active_model", "The model that answers")
         info.add_metric([], {"model": status["model"]["active"], "version": status["version"]})
         yield info

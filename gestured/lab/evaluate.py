@@ -72,31 +72,22 @@ def outcome(
     def share(chosen: NDArray[np.bool_], of: int) -> float:
         return float(chosen.sum() / of) if of else float("nan")
 
-    hits, misses = share(right & published & known, total), share(~right & published & known, total)
-    ends = _intervals(known, published, right, known.sum() / max(total, 1), people)
-    return Evaluation(
-        total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
-        share(~published & ~known, int((~known).sum())), len(np.unique(people)), ends,
-    )  # fmt: skip
-
-
-def _intervals(
-    known: NDArray[np.bool_],
-    published: NDArray[np.bool_],
-    right: NDArray[np.bool_],
-    cut: float,
-    people: NDArray[np.int64],
-) -> dict[str, dict[str, float]]:
-    """Low and high of each of `SHARES`; `cut` is the share of the gestures that were cut out."""
-
     def ends(chosen: NDArray[np.bool_], of: NDArray[np.bool_]) -> NDArray[np.float64]:
         return np.array(interval(chosen[of], people[of])[1:])
 
+    hits, misses = share(right & published & known, total), share(~right & published & known, total)
+    cut = known.sum() / max(total, 1)  # the share of the gestures that were cut out
     found = (
         cut * ends(right & published, known), cut * ends(~right & published, known),
         cut * ends(~published, known) + 1 - cut, ends(~published, ~known),
     )  # fmt: skip
-    return {name: {"low": float(low), "high": float(high)} for name, (low, high) in zip(SHARES, found, strict=True)}
+    lows_highs = {
+        name: {"low": float(low), "high": float(high)} for name, (low, high) in zip(SHARES, found, strict=True)
+    }
+    return Evaluation(
+        total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
+        share(~published & ~known, int((~known).sum())), len(np.unique(people)), lows_highs,
+    )  # fmt: skip
 
 
 def model_answers(model: Model, samples: Samples) -> Answers:

@@ -128,12 +128,8 @@ class _Life:
                 continue
             begin, end = at - APART_S, at + made[-1][0] + made[-1][1].duration_s + APART_S
             changes = any(begin < a < end or at < b < end for a, b, _ in resting)
-            if (
-                begin > last
-                and end < self.seconds
-                and not changes
-                and not any(a < end and b > begin for a, b in moving)
-            ):
+            moves = any(a < end and b > begin for a, b in moving)
+            if last < begin and end < self.seconds and not changes and not moves:
                 last = end
                 left = any(b < at <= b + 1.0 for _, b, _ in resting)
                 lay = under[0].kind if under else LEFT if left else NOTHING
@@ -155,12 +151,8 @@ class _Life:
                 one = perform(name, self.person, self.rng, speed, inclination, self.sensor.extent)
                 made.append((after, one))
                 after += one.duration_s + (float(self.rng.uniform(*AFTER_WAKE_S)) if self.wake else 0.0)
-            if not any(
-                _covers(since + start, rest, press)
-                for since, rest in lying
-                for start, one in made
-                for press in one.contacts
-            ):
+            presses = [(start, press) for start, one in made for press in one.contacts]
+            if not any(_covers(since + start, rest, press) for since, rest in lying for start, press in presses):
                 return made
         return None
 

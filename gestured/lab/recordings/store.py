@@ -39,14 +39,9 @@ def join_recordings(parts: Sequence[Recordings]) -> Recordings:
     lengths = np.concatenate([np.diff(part.offsets) for part in parts])
     joined["offsets"] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     if "event_recording" in joined:
-        before = np.cumsum([0, *(len(part) for part in parts)])
-        joined["event_recording"] = np.concatenate(
-            [
-                part.event_recording + start
-                for part, start in zip(parts, before, strict=False)
-                if part.event_recording is not None
-            ]
-        )
+        before = np.cumsum([0, *(len(part) for part in parts)])[:-1]
+        numbers = zip((part.event_recording for part in parts), before, strict=True)
+        joined["event_recording"] = np.concatenate([of + start for of, start in numbers if of is not None])
     return Recordings(**joined)
 
 
