@@ -81,9 +81,7 @@ class Keeper:
         """Put one line of the tap onto the tape."""
         if line["type"] == "packet":
             self._t_ns = line["t_ns"] + self._epoch_ns
-            packet = base64.b64decode(line["data"])
-            source = Address(*line["source"])
-            self._tape.packet(self._t_ns, str(source), packet)
+            self._tape.packet(self._t_ns, str(Address(*line["source"])), base64.b64decode(line["data"]))
             self.packets += 1
         elif line["type"] == "lost":
             self.lost += line["count"]

@@ -34,13 +34,8 @@ def add(commands: Commands) -> None:
     parser.takes("--to", "HOST:PORT", text, type=host_port, default=Address("127.0.0.1", 9000))
     parser.takes("--sensor", "NAME", "its name (default: simulated)", type=sensor_name, default="simulated")
     parser.takes("--seconds", "S", "end after so long (default: go on)", type=number(0.001, 1e9))
-    parser.add_argument(
-        "--everyday",
-        nargs="?",
-        const="armrest",
-        choices=tuple(PLACES),
-        help="everyday contact at a place (default: armrest), in which few gestures are meant; --seed says whose",
-    )
+    text = "everyday contact at a place (default: armrest), in which few gestures are meant; --seed says whose"
+    parser.add_argument("--everyday", nargs="?", const="armrest", choices=tuple(PLACES), help=text)
     add_arguments(parser)
     text = "send a blob instead of floats (default: uint16)"
     parser.add_argument("--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help=text)
@@ -69,11 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _telling(
-    frames: Iterator[tuple[int, Frame]],
-    start: float,
-    events: tuple[Act, ...],
-    sensor: Sensor,
-    as_json: bool,
+    frames: Iterator[tuple[int, Frame]], start: float, events: tuple[Act, ...], sensor: Sensor, as_json: bool
 ) -> Iterator[tuple[int, Frame]]:
     """The frames unchanged; each performance is printed when it ends. Raises GesturedError if nobody listens."""
     left = sorted(events, key=lambda event: event.offset_s)  # acts overlap: what rests outlasts others

@@ -159,12 +159,7 @@ def scene(parts: Parts) -> dict[str, Any]:
         "version": __version__,
         "instance": parts.instance,
         "epoch_ns": parts.taps.epoch_ns,
-        "model": {
-            "name": parts.ladder.active,
-            "sha256": model.sha256,
-            "rows": model.rows,
-            "columns": model.columns,
-        },
+        "model": {"name": parts.ladder.active, "sha256": model.sha256, "rows": model.rows, "columns": model.columns},
         "gestures": list(parts.hub.scene.gestures),
         "own": to_dict(parts.own.gestures),
         "settings": parts.settings.model_dump(mode="json"),

@@ -226,10 +226,7 @@ def run(args: argparse.Namespace) -> int:
     others = args.non_gestures or (NON_GESTURES if args.pad else ())
     trials = order(args.participant, args.seed, args.gestures, args.repeats, others)
     listen = Address("127.0.0.1", 0) if args.pad else args.listen
-    with (
-        closing(LiveSensor(listen, args.grid, args.sensor, model)) as sensor,
-        ExitStack() as held,
-    ):
+    with closing(LiveSensor(listen, args.grid, args.sensor, model)) as sensor, ExitStack() as held:
         session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
         if isinstance(terminal, PadTerminal):
             pad = Pad(Address(*sensor.socket.getsockname()), args.sensor or "pad", args.grid, RATE_HZ)
