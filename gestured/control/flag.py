@@ -38,8 +38,7 @@ def run(args: argparse.Namespace) -> int:
     with connect(args) as control:
         keeper = flag(control, path, args.note)
     kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": keeper.scene["model"]}
-    words = f"{path}: {keeper.packets} packets, {keeper.events} events"
-    tell(args.json, kept, words)
+    tell(args.json, kept, f"{path}: {keeper.packets} packets, {keeper.events} events")
     return 0
 
 

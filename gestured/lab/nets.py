@@ -89,13 +89,9 @@ class CnnLstm(Recurrent):
         size = -(-rows // 2) // 2 * (-(-columns // 2) // 2)
         super().__init__(32 * size, classes)
         self.convolutions = nn.Sequential(
-            nn.Conv2d(1, 16, 3, padding=1),
-            nn.ReLU(),
-            nn.MaxPool2d(2, ceil_mode=True),
-            nn.Conv2d(16, 32, 3, padding=1),
-            nn.ReLU(),
-            nn.MaxPool2d(2),
-        )
+            nn.Conv2d(1, 16, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2, ceil_mode=True),
+            nn.Conv2d(16, 32, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2),
+        )  # fmt: skip
 
     def features(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, T, 32 * cells left after pooling)."""
@@ -131,14 +127,10 @@ class Perceptron(Standardising):
     def __init__(self, inputs: int, classes: int) -> None:
         super().__init__(inputs)
         self.layers = nn.Sequential(
-            nn.Linear(inputs, HIDDEN),
-            nn.ReLU(),
-            nn.Dropout(0.1),
-            nn.Linear(HIDDEN, HIDDEN),
-            nn.ReLU(),
-            nn.Dropout(0.1),
+            nn.Linear(inputs, HIDDEN), nn.ReLU(), nn.Dropout(0.1),
+            nn.Linear(HIDDEN, HIDDEN), nn.ReLU(), nn.Dropout(0.1),
             nn.Linear(HIDDEN, classes),
-        )
+        )  # fmt: skip
 
     def embed(self, features: Tensor) -> Tensor:
         """(B, inputs) -> (B, HIDDEN): the last hidden layer."""

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,7 @@ class Samples:
 
 
 OF_EACH = Samples.__slots__[2:]  # the fields (G,)
+DTYPES = ("U40", "U40", "int64", "float64", "int64", "int64")  # of these, without the context
 
 
 def packed(windows: Sequence[NDArray[np.float16]]) -> tuple[NDArray[np.float16], NDArray[np.int64]]:
@@ -96,16 +97,9 @@ def sample(segment: Segment, label: str, kind: str, person: int, window: Window 
 def collect(samples: Iterable[Sample]) -> Samples:
     """Put single samples together."""
     found = list(samples)
-    return Samples(
-        *packed([s[0] for s in found]),
-        np.array([s[1] for s in found], dtype="U40"),
-        np.array([s[2] for s in found], dtype="U40"),
-        np.array([s[3] for s in found], dtype=np.int64),
-        np.array([s[4] for s in found], dtype=np.float64),
-        np.array([s[5] for s in found], dtype=np.int64),
-        np.array([s[6] for s in found], dtype=np.int64),
-        np.array([s[7] for s in found], dtype=np.float32).reshape(len(found), len(NAMES)),
-    )
+    each: list[NDArray[Any]] = [np.array([s[k] for s in found], dtype=dtype) for k, dtype in enumerate(DTYPES, 1)]
+    each.append(np.array([s.context for s in found], np.float32).reshape(len(found), len(NAMES)))
+    return Samples(*packed([s.window for s in found]), *each)
 
 
 def join(parts: Sequence[Samples]) -> Samples:
