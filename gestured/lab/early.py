@@ -197,23 +197,15 @@ class Foretold:
     def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
         """Ask each part's networks about its samples, with as many non-gestures, drawn at random, as sessions hold."""
         parts = [(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts]
-        whole: list[Evidences] = []
-        released: list[Evidences] = []
-        early: list[Evidences] = []
-        contact, since, second, before = [], [], [], 0
-        for nets, samples in parts:
-            cut, of, frames = prefixes(samples)
-            whole.append(_evidence(nets, samples))
-            released.append(_evidence(nets, at_release(samples)))
-            early.append(_evidence(nets, cut))
-            contact.append(of + before)
-            since.append(frames)
-            asked_before = np.arange(len(of)) - np.searchsorted(of, of)
-            second.append(frames > asked_before)  # true after a frame that was not touched
-            before += len(samples)
-        together = join([samples for _, samples in parts])
-        contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
-        return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
+        cut = [prefixes(samples) for _, samples in parts]
+        before = np.cumsum([0, *(len(samples) for _, samples in parts)])[:-1]  # samples of the parts before
+        contact = np.concatenate([of + start for (_, of, _), start in zip(cut, before, strict=True)])
+        since = np.concatenate([frames for _, _, frames in cut])
+        second = since > np.arange(len(contact)) - np.searchsorted(contact, contact)  # a frame was not touched before
+        whole = _joined([_evidence(nets, samples) for nets, samples in parts])
+        released = _joined([_evidence(nets, at_release(samples)) for nets, samples in parts])
+        early = _joined([_evidence(nets, some) for (nets, _), (some, _, _) in zip(parts, cut, strict=True)])
+        return cls(join([samples for _, samples in parts]), whole, released, early, contact, since, second)
 
     def rule(self, name: str, module: Judged, least: float | NDArray[np.float64]) -> dict[str, Any]:
         """The metadata `provisional` of a network that publishes from `least` on, for all or (G,) of each gesture."""

@@ -34,23 +34,23 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
     arrival, and the later ones by the sensor's clock.
     """
     rows, columns = take.frames.shape[1:]
-    with Engine(model, rows, columns, "--clock", "sensor") as engine:
-        with (
-            Subscriber(engine.socket, types=["gesture", "unknown"], reconnect=False) as subscriber,
-            closing(Sensor(engine.listen, Form("lab"))) as sensor,
-        ):
-            heard = read_ahead(line for _, line in subscriber.lines())
-            heard.get()  # after the hello no event is missed
-            epoch, start = time.time(), time.monotonic()
-            first = float(take.sensor_times[0])
-            for n in range(len(take.frames)):
-                t = float(take.sensor_times[n])
-                wait = start + (t - first) / speed - time.monotonic()
-                if wait > 0.002:  # in small bursts: a sleep for each frame would be the slowest part
-                    time.sleep(wait)
-                sensor.socket.send(sensor.form.packet(Frame(t, take.frames[n]), int(take.counter[n]), epoch + t))
-            engine.close()  # the daemon flushes what is open, and hangs up
-            events = [line for line in iter(heard.get, None) if line["type"] in ("gesture", "unknown")]
+    with (
+        Engine(model, rows, columns, "--clock", "sensor") as engine,
+        Subscriber(engine.socket, types=["gesture", "unknown"], reconnect=False) as subscriber,
+        closing(Sensor(engine.listen, Form("lab"))) as sensor,
+    ):
+        heard = read_ahead(line for _, line in subscriber.lines())
+        heard.get()  # after the hello no event is missed
+        epoch, start = time.time(), time.monotonic()
+        first = float(take.sensor_times[0])
+        for n in range(len(take.frames)):
+            t = float(take.sensor_times[n])
+            wait = start + (t - first) / speed - time.monotonic()
+            if wait > 0.002:  # in small bursts: a sleep for each frame would be the slowest part
+                time.sleep(wait)
+            sensor.socket.send(sensor.form.packet(Frame(t, take.frames[n]), int(take.counter[n]), epoch + t))
+        engine.close()  # the daemon flushes what is open, and hangs up
+        events = [line for line in iter(heard.get, None) if line["type"] in ("gesture", "unknown")]
     if sensor.unheard:
         raise GesturedError(f"{sensor.unheard} packets were refused by the daemon's port")
     return events, epoch - first

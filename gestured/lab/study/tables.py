@@ -70,22 +70,19 @@ class Cell:
 
 def wanted(plan: Plan, sets: Iterable[str]) -> list[Cell]:
     """The cells of all tables of these sets of data; methods beyond the paper have tuned hyperparameters alone."""
-    cells = []
-    for method in METHODS.values():
-        for settings in (GIVEN, TUNED) if method.paper else (TUNED,):
-            for data in sets:
-                for protocol in ASKED.get(data, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
-                    for augmentation in AUGMENTATIONS:
-                        if _skipped(plan, settings, protocol, augmentation):
-                            continue
-                        cells.append(Cell(method.id, settings, augmentation, protocol, data))
-    return cells
+    return [
+        Cell(method.id, settings, augmentation, protocol, data)
+        for method in METHODS.values()
+        for settings in ((GIVEN, TUNED) if method.paper else (TUNED,))
+        for data in sets
+        for protocol in ASKED.get(data, (PAPER, PADDED, CLEAN, PARTICIPANTS))
+        for augmentation in AUGMENTATIONS
+        if not _skipped(plan, settings, protocol, augmentation)
+    ]
 
 
 def _skipped(plan: Plan, settings: str, protocol: str, augmentation: str) -> bool:
-    if protocol == REAL and (augmentation == SHIFT or settings == GIVEN):
-        return True
-    if protocol == FOREIGN and settings == GIVEN:
+    if (protocol in (REAL, FOREIGN) and settings == GIVEN) or (protocol == REAL and augmentation == SHIFT):
         return True
     further = protocol == PADDED or (protocol == FOREIGN and augmentation != SHIFT)
     return plan.quick and (settings == GIVEN or further)

@@ -144,15 +144,13 @@ class Net:
 
     def scores(self, inputs: Inputs, index: Indices) -> NDArray[np.float64]:
         """(n, K) probabilities of the chosen samples."""
-        order = np.argsort(inputs.samples.lengths()[index], kind="stable") if isinstance(inputs, Windows) else None
-        sorted_index = index if order is None else index[order]
+        order = np.arange(len(index))
+        if isinstance(inputs, Windows):  # those of similar length together
+            order = np.argsort(inputs.samples.lengths()[index], kind="stable")
+        batches = (inputs.batch(index[order[i : i + 256]]) for i in range(0, len(index), 256))
         with torch.no_grad():
-            parts = [
-                self.module(*inputs.batch(sorted_index[i : i + 256])).softmax(1).numpy()
-                for i in range(0, len(index), 256)
-            ]
-        found = np.concatenate(parts).astype(np.float64)
-        return found if order is None else found[np.argsort(order, kind="stable")]
+            found = np.concatenate([self.module(*batch).softmax(1).numpy() for batch in batches]).astype(np.float64)
+        return found[np.argsort(order, kind="stable")]
 
 
 def train_net(
