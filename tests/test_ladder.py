@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
-from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for, report_missing_points
+from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
@@ -180,10 +180,10 @@ def test_a_strictness_that_the_model_does_not_have_is_said_where_it_is_set(
 ) -> None:
     said: list[str] = []
     path = build(tmp_path / "some.onnx", operating_points=operating_points())
-    report_missing_points(ladder_for(path, report=said.append), ("strict", strictness))
+    ladder_for(path, report=said.append).report_missing_points(("strict", strictness))
     assert said == []
     path = build(tmp_path / "none.onnx")
-    report_missing_points(ladder_for(path, report=said.append), (None, "normal", strictness))
+    ladder_for(path, report=said.append).report_missing_points((None, "normal", strictness))
     sentence = "none has no operating points: whatever the strictness, it takes its one threshold"
     assert said == ([sentence] if strictness in ("eager", "strict") else [])
 

@@ -16,14 +16,7 @@ from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import OscSink, UdpOut
 from gestured.daemon.tuio import TUIO, TuioSink
 from gestured.model import own_file
-from gestured.model.ladder import (
-    Ladder,
-    gestures_in_use,
-    ladder_for,
-    report_missing_points,
-    require_arming,
-    require_gestures,
-)
+from gestured.model.ladder import Ladder, ladder_for, require_arming
 
 SLIP = 0.8  # difflib's ratio from which a name counts as a misspelt gesture of the model
 
@@ -79,13 +72,13 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
         ladder.report(sentence)
-    report_missing_points(ladder, (settings.strictness, *(own.strictness for own in settings.sensors.values())))
-    gestures_in_use(ladder, settings.gestures)
+    ladder.report_missing_points((settings.strictness, *(own.strictness for own in settings.sensors.values())))
+    ladder.gestures_in_use(settings.gestures)
     named: dict[str, Iterable[str]] = {"gestures": settings.per_gesture}
     for name, sensor in settings.sensors.items():
         named |= {f"sensors.{name}.zones.{zone}.gestures": one.gestures or () for zone, one in sensor.zones.items()}
     for field, names in named.items():
-        require_gestures(ladder, (name for name in names if not _may_be_own(name, settings, ladder)), field)
+        ladder.require_gestures((name for name in names if not _may_be_own(name, settings, ladder)), field)
     _require_arming(settings, ladder)
     return ladder
 
@@ -109,5 +102,5 @@ def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
 
 def scene_of(settings: Settings, ladder: Ladder) -> Scene:
     """The scene of these settings, with a `ladder` that knows all gestures they name."""
-    used = gestures_in_use(ladder, settings.gestures)
+    used = ladder.gestures_in_use(settings.gestures)
     return Scene.from_dict(settings.model_dump(), used, (ladder.rows, ladder.columns))

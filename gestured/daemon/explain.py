@@ -13,7 +13,7 @@ from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import TABLES, TITLES, Part, Settings, as_written
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
-from gestured.model.ladder import Ladder, gestures_in_use
+from gestured.model.ladder import Ladder
 
 LOADS, FALLBACKS, INPUT, OUTPUT, THRESHOLDS, COMPUTES, LEAVES, SET_BY = TITLED = (
     "loads", "falls back on", "listens to", "publishes on", "thresholds", "computes", "leaves out", "set by",
@@ -40,7 +40,7 @@ def _models(settings: Settings, ladder: Ladder) -> Said:
     what = f"{model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, sha256 {model.sha256[:12]}"
     made_for = f"{window.rows}x{window.columns} at {window.rate_hz:g} Hz"
     yield LOADS, f"model {ladder.active}: {what}, {made_for}"
-    used = gestures_in_use(ladder, settings.gestures)
+    used = ladder.gestures_in_use(settings.gestures)
     yield LOADS, f"gestures {', '.join(used)}"
     if unused := [name for name in ladder.gestures if name not in used]:
         yield LEAVES, f"gestures {', '.join(unused)}: their scores are dropped"
@@ -112,7 +112,7 @@ def _answers(settings: Settings, ladder: Ladder) -> Said:
     made = "its frames as a window" if metadata.features is None else "touch-pattern features"
     yield COMPUTES, f"after a contact: {made}, one inference"
     answered = f"at {rate_hz:g} Hz a contact is answered {felt(timing.release_s)} after its last touched frame"
-    if DOUBLE_TAP in gestures_in_use(ladder, settings.gestures):
+    if DOUBLE_TAP in ladder.gestures_in_use(settings.gestures):
         yield COMPUTES, f"{answered}, a tap {felt(timing.tap_gap_s)} after it, since a second one may come"
     else:
         yield COMPUTES, answered

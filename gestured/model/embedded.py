@@ -27,14 +27,7 @@ from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.core.where import zones_of
 from gestured.model import own_file
-from gestured.model.ladder import (
-    Ladder,
-    gestures_in_use,
-    ladder_for,
-    report_missing_points,
-    require_arming,
-    require_gestures,
-)
+from gestured.model.ladder import Ladder, ladder_for, require_arming
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
@@ -187,7 +180,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
         if not isinstance(name, str):
             raise SettingsError(f"zones: expected a text as the name of each, found {name!r}")
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
-    used = gestures_in_use(ladder, gestures)
+    used = ladder.gestures_in_use(gestures)
     if own_gestures is not None:
         ladder.own = _own(ladder, Path(own_gestures))
     try:
@@ -207,9 +200,9 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
         )
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingsError(str(error)) from None
-    report_missing_points(ladder, (strictness,))
+    ladder.report_missing_points((strictness,))
     named = (name for zone in scene.setup(sensor).zones.values() for name in zone.gestures or ())
-    require_gestures(ladder, (name for name in named if name not in ladder.own.gestures))
+    ladder.require_gestures(name for name in named if name not in ladder.own.gestures)
     require_arming(scene, (*used, *ladder.own.gestures))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
@@ -231,7 +224,7 @@ def _own(ladder: Ladder, path: Path) -> Own:
 
 def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:
     """Confidences by name, of the model's gestures and the user's own."""
-    require_gestures(ladder, (name for name in told if name not in ladder.own.gestures), "thresholds")
+    ladder.require_gestures((name for name in told if name not in ladder.own.gestures), "thresholds")
     for name, least in told.items():
         if isinstance(least, bool) or not isinstance(least, Real) or not 0 <= least <= 1:
             raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")

@@ -153,6 +153,29 @@ class Ladder:
             self._faint, self._previews_from = 0, end + RETRY_S
         return scores
 
+    def report_missing_points(self, strictness: Iterable[str | None]) -> None:
+        """Report if a `strictness` is set and the model that answers has no operating points."""
+        if self.model.points is None and set(strictness) - {None, USUAL}:
+            self.report(f"{self.active} has no operating points: whatever the strictness, it takes its one threshold")
+
+    def require_gestures(self, names: Iterable[str], field: str = "gestures") -> None:
+        """Raise SettingsError, which names the `field`, for a name that is none of the gestures."""
+        for name in names:
+            if name not in self.gestures:
+                known = ", ".join(self.gestures)
+                raise SettingsError(f"{field}: {name!r} is no gesture of {self.name}, expected any of {known}")
+
+    def gestures_in_use(self, chosen: Sequence[str] | None) -> tuple[str, ...]:
+        """The chosen gestures in the models' order, all if `chosen` is None. Raises SettingsError."""
+        if chosen is None:
+            return self.gestures
+        if isinstance(chosen, str):
+            raise SettingsError(f"gestures: expected a list of names, such as [{chosen!r}], found {chosen!r}")
+        self.require_gestures(chosen)
+        if not chosen:
+            raise SettingsError("gestures: an empty list, expected at least one gesture")
+        return tuple(name for name in self.gestures if name in chosen)
+
     def _first_open(self) -> tuple[Rung, Model]:
         failed: list[tuple[Rung, str]] = []
         for rung in self.rungs:
@@ -201,34 +224,8 @@ def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None
     return Ladder([source, *fallbacks], **settings)
 
 
-def report_missing_points(ladder: Ladder, strictness: Iterable[str | None]) -> None:
-    """Have the ladder report if a `strictness` is set and the model that answers has no operating points."""
-    if ladder.model.points is None and set(strictness) - {None, USUAL}:
-        ladder.report(f"{ladder.active} has no operating points: whatever the strictness, it takes its one threshold")
-
-
-def require_gestures(ladder: Ladder, names: Iterable[str], field: str = "gestures") -> None:
-    """Raise SettingsError, which names the `field`, for a name that is no gesture of the ladder's."""
-    for name in names:
-        if name not in ladder.gestures:
-            known = ", ".join(ladder.gestures)
-            raise SettingsError(f"{field}: {name!r} is no gesture of {ladder.name}, expected any of {known}")
-
-
 def require_arming(scene: Scene, known: Sequence[str]) -> None:
     """Raise SettingsError if a gesture that arms a sensor is not known, since no other would ever count."""
     for field, gesture in scene.arming_gestures.items():
         if gesture not in known:
             raise SettingsError(f"{field} = {gesture!r}: is no gesture in use, expected any of {', '.join(known)}")
-
-
-def gestures_in_use(ladder: Ladder, chosen: Sequence[str] | None) -> tuple[str, ...]:
-    """The chosen gestures in the ladder's order, all if `chosen` is None. Raises SettingsError."""
-    if chosen is None:
-        return ladder.gestures
-    if isinstance(chosen, str):
-        raise SettingsError(f"gestures: expected a list of names, such as [{chosen!r}], found {chosen!r}")
-    require_gestures(ladder, chosen)
-    if not chosen:
-        raise SettingsError("gestures: an empty list, expected at least one gesture")
-    return tuple(name for name in ladder.gestures if name in chosen)
