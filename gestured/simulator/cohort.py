@@ -7,6 +7,7 @@ parallel.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -160,17 +161,16 @@ def cohort_take(trial: Trial, seed: int = 0) -> Take:
     return gesture_take(trial.gesture, Participant(person), sensor, rng, trial.speed, trial.inclination)
 
 
-@dataclass(frozen=True)
-class WideTake:
-    """The plan of a take of the wide stream; the performance continues with the state of `rng`."""
+class WideTake(NamedTuple):
+    """The plan of a take of the wide stream: what `gesture_take` takes, which continues with the state of `rng`."""
 
     kind: str
     participant: Participant
     sensor: SimulatedSensor
+    rng: np.random.Generator
     speed: str
     inclination: int
     hurry: float
-    rng: np.random.Generator
 
 
 def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
@@ -182,7 +182,7 @@ def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
     kind = next(at_random(rng, OTHERS_SHARE))
     speed = any_speed(rng)
     hurry = float(rng.uniform(1.3, 2.5)) if rng.random() < FLICKS * hard else 1.0
-    return WideTake(kind, person, sensor, speed, int(rng.integers(3)), hurry, rng)
+    return WideTake(kind, person, sensor, rng, speed, int(rng.integers(3)), hurry)
 
 
 def wide(seed: int, index: int, hardness: float | None = None) -> Take:
@@ -190,7 +190,4 @@ def wide(seed: int, index: int, hardness: float | None = None) -> Take:
 
     `hardness` (0..1, as in `any_sensor`) is random for each take unless it is given.
     """
-    plan = wide_plan(seed, index, hardness)
-    return gesture_take(
-        plan.kind, plan.participant, plan.sensor, plan.rng, plan.speed, plan.inclination, hurry=plan.hurry
-    )
+    return gesture_take(*wide_plan(seed, index, hardness))
