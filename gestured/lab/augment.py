@@ -77,11 +77,8 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
     gain = torch.exp(0.25 * torch.randn(batch, 1, *x.shape[2:], generator=generator) * draw(batch, 1, 1, 1))
     x = torch.where(some(0.4) > 0, x * gain, x)
     x = torch.where(some(0.3) > 0, x.clamp(min=0) ** torch.exp((draw(batch, 1, 1, 1) - 0.5) * 0.9), x)
-    cross = (
-        0.12 * draw(batch, 1, 1, 1) * x.mean(3, keepdim=True) * 3
-        + 0.12 * draw(batch, 1, 1, 1) * x.mean(2, keepdim=True) * 3
-    )
-    x = x + some(0.25) * cross
+    rows, columns = (0.12 * draw(batch, 1, 1, 1) * x.mean(over, keepdim=True) * 3 for over in (3, 2))
+    x = x + some(0.25) * (rows + columns)
     blurred = F.avg_pool2d(x, 3, 1, 1)
     x = torch.where(some(0.2) > 0, x + (blurred - x) * draw(batch, 1, 1, 1) * 0.7, x)
     if time >= 4:

@@ -141,14 +141,8 @@ def curve(answers: Answers, labels: NDArray[np.int64]) -> NDArray[np.float64]:
     published = confidence(answers)[None, :] >= np.array(THRESHOLDS)[:, None]
     with np.errstate(invalid="ignore"):
         gestures, others = np.float64(known.sum()), np.float64((~known).sum())
-        return np.stack(
-            [
-                (published & known & right).sum(1) / gestures,
-                (published & known & ~right).sum(1) / gestures,
-                (published & ~known).sum(1) / others,
-            ],
-            1,
-        )
+        rightly, wrongly = ((published & known & so).sum(1) / gestures for so in (right, ~right))
+        return np.stack([rightly, wrongly, (published & ~known).sum(1) / others], 1)
 
 
 def threshold(answers: Answers, labels: NDArray[np.int64], sets: NDArray[np.int64] | None = None) -> float:

@@ -169,18 +169,15 @@ class Decision(nn.Module):
         one, two = first.log_softmax(1), second.log_softmax(1)
         scores = (self.share[0] * one[:, :g] + self.share[1] * two[:, :g]).log_softmax(1)
         best = scores.argmax(1, keepdim=True)
-        cues = torch.stack(
-            [
-                one[:, g:].logsumexp(1) - one[:, :g].logsumexp(1),
-                two[:, g:].logsumexp(1) - two[:, :g].logsumexp(1),
-                -one.gather(1, best)[:, 0],
-                -two.gather(1, best)[:, 0],
-                -scores.gather(1, best)[:, 0],
-                (one[:, :g].softmax(1) - two[:, :g].softmax(1)).abs().sum(1),
-            ],
-            1,
-        )
-        return scores, cues.clamp(-12, 12)
+        cues = [
+            one[:, g:].logsumexp(1) - one[:, :g].logsumexp(1),
+            two[:, g:].logsumexp(1) - two[:, :g].logsumexp(1),
+            -one.gather(1, best)[:, 0],
+            -two.gather(1, best)[:, 0],
+            -scores.gather(1, best)[:, 0],
+            (one[:, :g].softmax(1) - two[:, :g].softmax(1)).abs().sum(1),
+        ]
+        return scores, torch.stack(cues, 1).clamp(-12, 12)
 
     def forward(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
         """Logits of both -> scores (B, G), unknown (B,)."""

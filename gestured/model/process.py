@@ -11,11 +11,11 @@ answers with one line of JSON.
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 from typing import Any
 
 OPEN_S = 8  # the longest time to open a model and to test it; half a second is usual, and a client waits for 20
@@ -25,7 +25,7 @@ START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker impo
 ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is tried at a time, since each child takes memory of the same service
-_child: "subprocess.Popen[bytes] | None" = None  # the child that was started last
+_child: "Popen[bytes] | None" = None  # the child that was started last
 _ending = False
 
 
@@ -65,7 +65,7 @@ def end_all() -> None:
         _child.kill()
 
 
-def _end_of(child: "subprocess.Popen[bytes]") -> str:
+def _end_of(child: "Popen[bytes]") -> str:
     """The reason why a child has ended without an answer."""
     child.kill()
     status = child.wait()
@@ -77,19 +77,13 @@ def _end_of(child: "subprocess.Popen[bytes]") -> str:
     return f"onnxruntime dies of it ({what})"
 
 
-def _started() -> "subprocess.Popen[bytes]":
+def _started() -> "Popen[bytes]":
     root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-I", "-S", "-c", START, *folders],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            cwd="/",
-            env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
-            | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
-            start_new_session=True,  # Ctrl-C is for this process alone
-        )
+    command = [sys.executable, "-I", "-S", "-c", START, *folders]
+    kept = {name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
+    env = kept | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"}
+    try:  # with a session of its own, since Ctrl-C is for this process alone
+        return Popen(command, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, cwd="/", env=env, start_new_session=True)
     except OSError as error:
         raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error

@@ -86,10 +86,8 @@ def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[li
 def _course(t: Array, rng: np.random.Generator, posture: Posture, road: float) -> Array:
     """The force (n,), about 1, of something that lands, breathes, lifts, is shaken by the road, and leaves."""
     seconds = float(t[-1])
-    land, leave = (float(rng.uniform(0.05, 0.5)) for _ in range(2))
-    course = np.clip(t / min(land, 0.4 * seconds), 0.0, 1.0) * np.clip(
-        (seconds - t) / min(leave, 0.4 * seconds), 0.0, 1.0
-    )
+    land, leave = (min(float(rng.uniform(0.05, 0.5)), 0.4 * seconds) for _ in range(2))
+    course = np.clip(t / land, 0.0, 1.0) * np.clip((seconds - t) / leave, 0.0, 1.0)
     shaken = 1.0 + road * wander(t, rng, *ROAD_HZ, 8)
     if not posture.still:
         shaken += float(rng.uniform(0.01, 0.06)) * np.sin(2 * math.pi * (BREATH_HZ * t + rng.random()))

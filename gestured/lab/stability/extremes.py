@@ -119,9 +119,8 @@ def streams(quick: bool) -> Iterator[Case]:
     few = 27 if quick else 1
     for power in (*range(-30, 31, 15 if quick else 5), -3, -2, -1, 1, 2, 3):
         for kind in (np.float32, np.float64):
-            yield Case(
-                "scale 1e-30 to 1e30", Series(base.times, (base.frames * 10.0**power).astype(kind)), at, alone=True
-            )
+            scaled = Series(base.times, (base.frames * 10.0**power).astype(kind))
+            yield Case("scale 1e-30 to 1e30", scaled, at, alone=True)
     clipped = Series(base.times, np.rint(np.maximum(swipes(2, noise=0.0, level=0.0)[0].frames, 0.0)))
     for power in range(-6, 7, 3):
         yield Case("scale of a sensor without noise", Series(base.times, clipped.frames * 10.0**power), at, alone=True)
@@ -133,9 +132,8 @@ def streams(quick: bool) -> Iterator[Case]:
         yield Case("offset up to 1e7: finite", Series(base.times, (base.frames + offset * SIGNAL).astype(np.float32)))
     for shape in ((2, 2), (9, 9), (64, 64)):
         for value in FINITE:
-            yield Case(
-                "constant signals: nothing", Series(np.arange(60) / 15, np.full((60, *shape), value)), alone=True
-            )
+            constant = Series(np.arange(60) / 15, np.full((60, *shape), value))
+            yield Case("constant signals: nothing", constant, alone=True)
     yield Case("one frame: nothing", Series(base.times[:1], base.frames[:1]), alone=True)
     touched = (base.times % 3.7 >= 1.5) & (base.times % 3.7 <= 2.0)
     for taxel in range(0, 81, few):
@@ -215,9 +213,8 @@ def whole_path_table(classifier: Classifier, quick: bool) -> Table:
     for family, verdicts in kept.items():
         wrong = [reason for _, _, reason in verdicts if reason]
         asked, found = sum(v[0] for v in verdicts), sum(v[1] for v in verdicts)
-        rows.append(
-            (family, len(verdicts), f"{found}/{asked}" if asked else "-", len(wrong), wrong[0] if wrong else "")
-        )
+        share = f"{found}/{asked}" if asked else "-"
+        rows.append((family, len(verdicts), share, len(wrong), wrong[0] if wrong else ""))
     return Table(
         "Extremes: the whole path",
         ("streams", "how many", "swipes named rightly", "faults", "the first"),
