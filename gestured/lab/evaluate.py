@@ -99,9 +99,8 @@ def model_answers(model: Model, samples: Samples) -> Answers:
     for length in np.unique(samples.lengths()):  # a padded window would seem to be over
         same = np.flatnonzero(samples.lengths() == length)
         for index in np.array_split(same, -(-len(same) // 200)):
-            scores[index], unknown[index] = model.run(
-                padded(samples, index, 100).numpy(), beside=samples.context[index]
-            )
+            windows, beside = padded(samples, index, 100).numpy(), samples.context[index]
+            scores[index], unknown[index] = model.run(windows, beside=beside)
     return scores, unknown
 
 

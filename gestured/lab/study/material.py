@@ -65,9 +65,8 @@ def equal_length(samples: Samples, frames: int) -> Samples:
     for i in range(len(samples)):
         window = samples.frames[samples.offsets[i] : samples.offsets[i + 1]][:frames]
         out[i, : len(window)] = window
-    return replace(
-        samples, frames=out.reshape(-1, *out.shape[2:]), offsets=np.arange(len(samples) + 1, dtype=np.int64) * frames
-    )
+    offsets = np.arange(len(samples) + 1, dtype=np.int64) * frames
+    return replace(samples, frames=out.reshape(-1, *out.shape[2:]), offsets=offsets)
 
 
 def averaged(samples: Samples, count: int) -> Samples:
