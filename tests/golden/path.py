@@ -133,7 +133,7 @@ def front_ends(tape: Tape) -> Iterator[tuple[str, FrontEnd, Stamp, list[tuple[in
     """
     settings = Settings.model_validate(dict(tape.settings))
     gestures = ("double_tap",) if settings.gestures is None else settings.gestures
-    scene = scene_of(settings, SimpleNamespace(gestures=gestures, rows=9, columns=9))  # type: ignore[arg-type]
+    scene = scene_of(settings, SimpleNamespace(gestures_in_use=lambda _: gestures, rows=9, columns=9))  # type: ignore[arg-type]
     decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=True)
     sensors: dict[str, tuple[Stamper, FrontEnd]] = {}
     numbers: Counter[str] = Counter()
