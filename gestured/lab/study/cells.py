@@ -70,7 +70,6 @@ class Schedule:
         return found
 
 
-
 def compute(task: Task, data: Data) -> tuple[Task, Result]:
     """A task and its result, by one thread: other processes compute beside this one."""
     torch.set_num_threads(1)
