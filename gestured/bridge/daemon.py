@@ -15,7 +15,7 @@ GONE = "gone"  # the type of a line that the bridge makes: the daemon is not the
 MOST_SENSORS = 4096  # the most names that are remembered, since any sender of frames can invent some
 DRIFT = 0.1  # s in a second by which a sensor's clock may drift; real ones drift a ten-thousandth of it
 HELD_S = 1.5  # a daemon that has not said its status for so long was held up, since it does so each second
-WORKS_OFF_S = 5.0  # and takes so long at most to work off what has waited
+WORKS_OFF_S = 5.0  # the longest that a daemon which was held up takes to work off the packets that have waited
 OLD_S = 1.0  # an older event is of no use: a window would open a second late
 
 Line = Mapping[str, Any]
@@ -64,7 +64,8 @@ class Daemon:
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._told = math.inf  # s since 1970, when the daemon last said its status
-        self._held, self._over = 0.0, 0.0  # s, how long it was held up before, and s since 1970, until when that counts
+        self._held = 0.0  # s, how long the daemon was held up the last time
+        self._over = 0.0  # s since 1970, until when its events may have waited for so long
         self._lags: dict[str, tuple[float, float]] = {}  # by sensor: smallest lag in s, and when it was updated
 
     def take(self, line: Line) -> None:

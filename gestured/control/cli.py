@@ -14,7 +14,7 @@ SUBCOMMANDS = {
     "operate": ("reload", "recalibrate", "emit", "inhibit", "allow", "gestures", "forget"),
     **{name: (name,) for name in ("enrol", "record", "flag", "replay", "export", "tune", "simulate", "check", "demo")},
 }
-ENDLESS = {"listen", "view", "pad", "simulate", "demo"}  # Ctrl-C is how they end; what others do, it cuts short
+ENDLESS = {"listen", "view", "pad", "simulate", "demo"}  # these end by Ctrl-C; any other command is cut short by it
 
 
 def parser(argv: Sequence[str] = ()) -> program.Parser:

@@ -380,7 +380,7 @@ class Hub:
             return False
         if now <= self._full_until:
             return True
-        if len(self._sensors) < self.scene.max_sensors - len(named):  # counted in a moment, where most are strangers
+        if len(self._sensors) < self.scene.max_sensors - len(named):  # this is so even if none of them is named
             return False
         self._banks.show()
         strangers = [sensor for sensor in self._sensors.values() if sensor.name not in named]

@@ -12,7 +12,7 @@ from gestured.daemon.sinks import UdpOut
 TUIO = "tuio"  # the scheme of a TUIO destination
 CURSOR = "/tuio/2Dcur"
 FRAMES = 2**31  # frame numbers begin anew here, since those of TUIO are int32
-SESSIONS = 2**24  # and session ids here, since some programs keep them as float32
+SESSIONS = 2**24  # session ids begin anew here, since some programs keep them as float32
 
 
 @dataclass(slots=True)

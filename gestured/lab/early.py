@@ -201,7 +201,8 @@ class Foretold:
         before = np.cumsum([0, *(len(samples) for _, samples in parts)])[:-1]  # samples of the parts before
         contact = np.concatenate([of + start for (_, of, _), start in zip(cut, before, strict=True)])
         since = np.concatenate([frames for _, _, frames in cut])
-        second = since > np.arange(len(contact)) - np.searchsorted(contact, contact)  # a frame was not touched before
+        # Whether an earlier frame of the contact was not touched.
+        second = since > np.arange(len(contact)) - np.searchsorted(contact, contact)
         whole = _joined([_evidence(nets, samples) for nets, samples in parts])
         released = _joined([_evidence(nets, at_release(samples)) for nets, samples in parts])
         early = _joined([_evidence(nets, some) for (nets, _), (some, _, _) in zip(parts, cut, strict=True)])

@@ -62,7 +62,8 @@ class Samples:
 
 
 OF_EACH = Samples.__slots__[2:]  # the fields (G,)
-DTYPES = ("U40", "U40", "int64", "float64", "int64", "int64")  # of these, without the context
+# numpy types of the fields in `OF_EACH`, but for the last, the context.
+DTYPES = ("U40", "U40", "int64", "float64", "int64", "int64")
 
 
 def packed(windows: Sequence[NDArray[np.float16]]) -> tuple[NDArray[np.float16], NDArray[np.int64]]:

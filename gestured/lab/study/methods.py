@@ -69,7 +69,7 @@ def _estimate(
     return Estimator(build(values, seed).fit(inputs[index], labels[index]), classes)
 
 
-# From inputs, the chosen ones, labels, the number of classes, hyperparameters and a seed.
+# Fits a model: inputs, the chosen ones, labels, the number of classes, hyperparameters and a seed -> the model.
 Fit = Callable[[Any, Indices, Indices, int, Values, int], Estimator | Net]
 
 

@@ -145,7 +145,7 @@ class Net:
     def scores(self, inputs: Inputs, index: Indices) -> NDArray[np.float64]:
         """(n, K) probabilities of the chosen samples."""
         order = np.arange(len(index))
-        if isinstance(inputs, Windows):  # those of similar length together
+        if isinstance(inputs, Windows):  # windows of similar length share a batch, so that little is padded
             order = np.argsort(inputs.samples.lengths()[index], kind="stable")
         batches = (inputs.batch(index[order[i : i + 256]]) for i in range(0, len(index), 256))
         with torch.no_grad():
