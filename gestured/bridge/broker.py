@@ -13,8 +13,11 @@ PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 BROKER_S = 5.0  # the longest wait for the broker while connecting
 KEEPALIVE_S = 5  # each side takes the other for dead after one and a half times as long without a packet
 MOST_BYTES = 65_536  # the largest packet that the broker may send, as CONNECT says; commands are much smaller
+ANY_BYTES = 268_435_460  # the largest packet that MQTT knows
+HEADER_BYTES = 15  # the most bytes of a PUBLISH of ours beside its topic and payload
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD as the broker knows them"
 # Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting does not help.
+TOO_LARGE, NO_RETAIN, NO_QOS_1 = 149, 154, 155
 REFUSALS = {
     132: "it does not speak MQTT 5: use a broker that does, such as mosquitto 1.6 or newer",
     133: "it does not take the name gestured-{host}: choose another one with --host",
@@ -22,9 +25,9 @@ REFUSALS = {
     135: f"this user may not connect: {_LOGIN}",
     138: "we are banned: ask whoever runs it",
     142: "another bridge has the same name, {host}: give each its own with --host",
-    149: "it takes no packets as large as ours, which have a few KiB: let it take them",
-    154: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
-    155: "it takes no messages with QoS 1, and others may get lost: let it take them",
+    TOO_LARGE: "it takes no packets as large as ours, which have a few KiB: let it take them",
+    NO_RETAIN: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
+    NO_QOS_1: "it takes no messages with QoS 1, and others may get lost: let it take them",
 }
 CLOSED, SILENT = 128, 141  # codes of the library: the broker gave no code, or was silent for too long
 
@@ -97,7 +100,7 @@ class Broker:
                 "--ca FILE, and the broker as its certificate does"
             )
         if code in REFUSALS:
-            raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
+            raise self.refusal(code)
         other = "is it one without TLS, or does it ask for a --cert that it knows?"
         hint = "is it one with TLS: --tls?" if self._tls is None else other
         if code == SILENT or "timed out" in said:
@@ -108,6 +111,23 @@ class Broker:
             return f"it closed the connection before it let us in ({hint})"
         who = f" at once: does another bridge have the name gestured-{self._host}? (--host)"
         return f"it closed the connection{who if held_s < LONGEST_S else ''}"
+
+    def largest(self, terms: Any) -> int:
+        """The size in bytes of the largest packet that the broker takes; `terms` are the properties of its CONNACK.
+
+        Raises BridgeError if it takes too little of MQTT. A broker that is sent what it does not take says why and
+        closes the connection, but what it says is lost if packets of ours were on their way.
+        """
+        if not getattr(terms, "RetainAvailable", 1):
+            raise self.refusal(NO_RETAIN)
+        if not getattr(terms, "MaximumQoS", 1):
+            raise self.refusal(NO_QOS_1)
+        largest: int = getattr(terms, "MaximumPacketSize", ANY_BYTES)
+        return largest
+
+    def refusal(self, code: int) -> BridgeError:
+        """The error to raise for a reason code of REFUSALS."""
+        return BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
 
     def hear(self, client: Any, topic: str) -> None:
         """Subscribe to commands at `topic`: no retained ones, and each with the flag whether it is to be retained."""

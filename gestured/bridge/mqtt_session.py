@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gestured.bridge.broker import Broker, properties, topic_of
+from gestured.bridge.broker import ANY_BYTES, HEADER_BYTES, TOO_LARGE, Broker, properties, topic_of
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
 from gestured.bridge.gates import OFF, ON, Gate
@@ -67,6 +67,7 @@ class Mqtt:
         self._changing: set[int] = set()  # numbers of retained messages that the broker has not acknowledged
         self._farewell = 0  # number of the last message, "offline"
         self._most = 0  # messages that may be in flight, without the last one
+        self._largest = ANY_BYTES  # bytes of the largest packet that the broker takes
 
     def stop(self) -> None:
         """Let `work` end at once with the last message, whatever else waits."""
@@ -145,6 +146,7 @@ class Mqtt:
             return
         self._connected, self._since = True, time.monotonic()
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
+        self._largest = self._broker.largest(terms)
         self._most = max(min(IN_FLIGHT, getattr(terms, "ReceiveMaximum", IN_FLIGHT)) - 1, 1)
         if self._gate is not None:
             self._broker.hear(client, self._commanded)
@@ -235,6 +237,11 @@ class Mqtt:
             self._counts.ready(broker=str(self._broker.address), host=self._host)
 
     def _publish(self, topic: str, payload: str | bytes, **options: Any) -> int:
-        """Publish a message with QoS 1 (it may come twice, but is not lost on the way); returns its number."""
+        """Publish a message with QoS 1 (it may come twice, but is not lost on the way); returns its number.
+
+        Raises BridgeError if the broker takes no packet of its size.
+        """
+        if HEADER_BYTES + len(topic.encode()) + len(payload) > self._largest:
+            raise self._broker.refusal(TOO_LARGE)
         number: int = self._client.publish(topic, payload, qos=1, **options).mid
         return number
