@@ -125,7 +125,7 @@ class Hub:
         return facts
 
     def ask(self, now: float) -> list[Fact]:
-        """Run the model once, on the segment that has waited longest to be classified; its answer comes when due."""
+        """Ask the model about the segment that has waited longest to be classified; its answer comes when due."""
         facts: list[Fact] = []
         while self.asks:
             sensor = self.asks.pop(next(iter(self.asks)))

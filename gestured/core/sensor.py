@@ -64,9 +64,9 @@ class Sensor:
         self._scene, self._decision = scene, Decision(scene, name)
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self.stamper = Stamper(scene.clock_of(name))
-        self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = (
-            None  # the classifier and the segment of the last question, and its answers
-        )
+        # The classifier and the segment of the last question, and its answers.
+        self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = None
+        self._alone: tuple[Classifier, Segment, Scores | None] | None = None  # the same, as if nothing had been before
         self.shown: Segment | None = None  # the segment that `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
@@ -162,15 +162,22 @@ class Sensor:
             elif isinstance(one, Ended):
                 told[:0] = self._fingers.end(self.front_end.baseline)  # the fingers' `up` comes before the release
                 told.append(Release(self.name, self.segments, one.offset))
+            elif isinstance(one, Cut):
+                told += self._decide(one)
+                self._asked = self._alone = self.shown = None
             else:
-                told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]
+                told.append(self._cancelled(one.reason))
         return told
 
     def ask(self) -> list[Told]:
         """Ask the classifier about the segment that was shown. No events follow before the answer is due."""
-        if self.shown is not None:
-            self._ask(self.shown)
-        self.shown = None
+        segment, self.shown = self.shown, None
+        if segment is not None:
+            answer, at = self._ask(segment)
+            if answer is not None:
+                scores, best, confidence, least = self._best(segment, answer, at)
+                if confidence < least:
+                    self._doubt(segment, scores[best], least)
         return []
 
     def _ask(self, segment: Segment) -> tuple[Scores | None, Where]:
@@ -184,16 +191,20 @@ class Sensor:
             asked = self._asked = self.classifier, segment, scores, where(segment, self._zones)
         return asked[2:]
 
+    def _best(self, segment: Segment, answer: Scores, at: Where) -> tuple[dict[str, float], str, float, float]:
+        """The scores of gestures in use, the best gesture, its confidence, and the confidence that it needs."""
+        scores, best, confidence = self._decision.best(self.classifier.gestures, answer, at.zone)
+        armed = segment.onset <= self._listening.armed_until
+        return scores, best, confidence, self._decision.threshold(best, answer, armed=armed)
+
     def _decide(self, cut: Cut) -> list[Told]:
         """The answer to a segment, and `Decided` if a classifier gave scores."""
         name, segment, decision, listening = self.name, cut.segment, self._decision, self._listening
         answer, at = self._ask(segment)
-        self._asked = self.shown = None
         if answer is None:
             return [self._cancelled("model")]
-        scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
+        scores, best, confidence, least = self._best(segment, answer, at)
         seen = cut.hole_s <= bearable_s(self.front_end.pace.interval_s)
-        least = decision.threshold(best, answer, armed=segment.onset <= listening.armed_until)
         known = seen and decision.may(best, at.zone) and confidence >= least
         decided = Decided(name, segment, answer, known)
         own = answer.own if seen and decision.is_own(answer.own, at.zone, known=known) else None
@@ -224,11 +235,15 @@ class Sensor:
     def _doubt(self, segment: Segment, score: float, least: float) -> str:
         """Why a segment's best gesture, with that score, is less sure than `least`: "context" if its past is why.
 
-        To find that out takes a run of the model, on which no answer depends. It takes none if the score is too low.
+        To find that out takes a run of the model, on which no answer depends. It takes none if the score is too low,
+        or if it was found out before the answer was due.
         """
         if score < least or segment.before == UNDISTURBED:
             return "confidence"
-        alone = self.classifier.preview(replace(segment, before=UNDISTURBED))
+        if self._alone is None or self._alone[0] is not self.classifier or self._alone[1] is not segment:
+            alone = self.classifier.preview(replace(segment, before=UNDISTURBED))
+            self._alone = self.classifier, segment, alone
+        alone = self._alone[2]
         return "context" if alone is not None and score * (1.0 - alone.unknown) >= least else "confidence"
 
     def _cancelled(self, why: str) -> Cancelled:

@@ -236,8 +236,13 @@ class Surrounded(Fake):
 
 
 def test_a_gesture_that_only_its_surroundings_make_unsure_has_them_as_the_reason() -> None:
-    classifier = Surrounded()
-    alone, soon = answers(run(recognizer(classifier), swipes(2)))
+    classifier, told, asked = Surrounded(), list[Event](), 0
+    subject = recognizer(classifier)
+    for frame in swipes(2):
+        events = answers(subject.push(frame))
+        assert not events or asked == len(classifier.seen)  # nothing is asked when it is decided
+        told, asked = told + events, len(classifier.seen)
+    alone, soon = told
     assert isinstance(alone, Gesture) and isinstance(soon, Unknown)
     assert soon.reason == "context" and soon.confidence == pytest.approx(0.9 * 0.1)
     assert classifier.previews == 1 and soon.scores == alone.scores
