@@ -24,6 +24,8 @@ from gestured.core.own import Example
 from gestured.model import own_file
 from gestured.model.model import Model
 from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
+from gestured.simulator import Participant, SimulatedSensor, generator, session
 from tests.daemon import tiny_model
 from tests.daemon.harness import Hand
 from tests.scenario import frames
@@ -260,6 +262,38 @@ def test_frames_that_are_passed_over_count_as_lost(recognizer: Any):
         events = recognizer.push(n / 15, values, lost=int(n == 33))
         lost += [event.lost for event in events if hasattr(event, "lost")]
     assert lost == [3]
+
+
+@pytest.fixture(scope="module")
+def take() -> Any:
+    """A simulated person's gestures, again and again."""
+    if not shipped()["cnn_lstm"].exists():
+        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
+    kinds = ["swipe_left", "double_tap", "swipe_up", "one_tap"] * 6
+    return session(Participant(7), SimulatedSensor.nominal(), generator(7), kinds=kinds)
+
+
+def test_zones_choose_among_the_gestures_that_begin_in_them(take: Any):
+    zones = {"volume": {"at": (0.0, 0.5, 1.0, 1.0), "gestures": ["swipe_left"]}, "lamp": (0.0, 0.0, 1.0, 0.5)}
+    recognizer = gestured.open("cnn_lstm", zones=zones)
+    events = [e for t, values in zip(take.times, take.frames, strict=True) for e in recognizer.push(t, values)]
+    heard = {(e.where.zone, e.gesture) for e in events if isinstance(e, gestured.Gesture)}
+    assert {gesture for zone, gesture in heard if zone == "volume"} == {"swipe_left"}
+    assert {gesture for zone, gesture in heard if zone == "lamp"} >= {"one_tap", "swipe_up"}
+
+
+def test_no_gesture_counts_before_the_one_that_arms_or_once_a_gate_is_closed(take: Any):
+    recognizer, heard = gestured.open("cnn_lstm", arming={"by": "double_tap", "seconds": 3}), []
+    for n, (t, values) in enumerate(zip(take.times, take.frames, strict=True)):
+        events = recognizer.push(t, values)
+        if n == len(take.times) // 2:
+            events += recognizer.inhibit(t, "door")
+        heard += [
+            getattr(e, "reason", "") or e.gesture for e in events if isinstance(e, gestured.Gesture | gestured.Unknown)
+        ]
+    before = heard[: heard.index("inhibited")]
+    assert before.index("disarmed") < before.index("double_tap") < before.index("swipe_up")
+    assert set(heard[len(before) :]) == {"inhibited"}
 
 
 @pytest.mark.parametrize("gate", [5, "", "back door", None], ids=repr)
