@@ -42,6 +42,9 @@ def propose(rows: Sequence[Seen], told: Scene | None = None) -> list[str]:
     for (pattern, name), seen in likeliest.items():
         if pattern == pressure:
             lines += _sensor(name, seen, scene)
+    hosts = {source.rpartition(":")[0].strip("[]") for seen in rows for source in seen.sources}
+    refused = sorted(host for host in hosts if not scene.may_send(host))
+    lines += [f"# {host} is not under allow: the daemon drops what it sends" for host in refused]
     lines = lines or [f"{'the settings of the daemon' if told else 'the defaults'} fit what arrives"]
     return lines + [f"# {other} looks like frames, too; a daemon takes one pattern" for other in others]
 

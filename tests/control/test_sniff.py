@@ -75,6 +75,13 @@ def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
     assert propose(sight.rows(), told) == ["the settings of the daemon fit what arrives"]
 
 
+@pytest.mark.parametrize(("network", "said"), [("127.0.0.0/8", "the settings of the daemon fit what arrives"),
+    ("10.0.0.0/8", "# 127.0.0.1 is not under allow: the daemon drops what it sends")])  # fmt: skip
+def test_a_sender_that_is_not_under_allow_is_named(network: str, said: str) -> None:
+    rows = seen(floats("/arm/pressure", Hand().frame(), n) for n in range(8)).rows()
+    assert propose(rows, Scene.from_dict({"allow": [network]}, ("any",), (9, 9))) == [said]
+
+
 def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
     sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(swipes(12, 6)))
     proposed = propose(sight.rows(), Scene(("any",), (9, 9), {"arm": Setup((6, 12))}))
