@@ -126,6 +126,7 @@ class _Meaning(NamedTuple):
     form: int  # the same number for layouts with heads and frame in the same places, of the same type and grid
     heads: bytes  # the heads of all its messages, and the size of a blob, joined
     places: tuple[tuple[int, int], ...]  # the bytes at which each of them begins and ends in the packet
+    touches: tuple[int, ...]  # the bytes at which each finger's x and y begin
 
 
 # Packets of one form: their indices among all, the meaning of the first, their sensors, and their heads, joined.
@@ -135,7 +136,7 @@ _Group = tuple[list[int], _Meaning, list[str], bytes]
 class Decoder:
     """Packets in, frames out. `grids` says the grid (R, C) of a sensor, as it is sent.
 
-    Without `keep_touches`, a trajectory is passed over as soon as its address and its type tags are known.
+    Without `keep_touches`, a trajectory is checked and then forgotten.
     """
 
     def __init__(
@@ -172,9 +173,11 @@ class Decoder:
                     arrivals.append(arrival := _frame(message, route))
                     if self._keep_touches:
                         found.append((message.bundle, route.sensor, arrival))
-                elif self._keep_touches:
-                    found.append((message.bundle, route.sensor, _touches(message.args)))
-                    touched = True
+                else:
+                    touches = _touches(message.args)
+                    if self._keep_touches:
+                        found.append((message.bundle, route.sensor, touches))
+                        touched = True
             except ProtocolError as error:
                 errors.append(error)
         return (self._join(found, source) if touched else arrivals), errors
@@ -226,11 +229,15 @@ class Decoder:
         if slot.blob:  # the size that stands before it
             heads.append((slot.run - 4, slot.length.to_bytes(4, "big")))
         places = tuple([(start, start + len(head)) for start, head in heads])
-        form = layout.length, places, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
+        # A trajectory's arguments are scalars of 4 bytes, three for each finger.
+        touches = tuple(
+            [o.scalars + at for o in layout.slots if o is not slot for at in range(4, 4 * len(o.types), 12)]
+        )
+        form = layout.length, places, touches, slot.run, slot.length, slot.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
         number = self._forms.setdefault(form, next(self._numbers))
-        return _Meaning(route, slot, dtype, number, b"".join([head for _, head in heads]), places)
+        return _Meaning(route, slot, dtype, number, b"".join([head for _, head in heads]), places, touches)
 
     def _find_route(self, address: str, types: str) -> _Route:
         matched = self._addresses.match(address)
@@ -313,14 +320,16 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 
 def _block(packets: Sequence[bytes], group: _Group) -> Block:
-    """The finite frames of packets that may be of one form; packets with other heads are left out."""
-    found, (route, slot, dtype, _, _, places), sensors, expected = group
+    """The frames of packets that may be of one form, without packets with other heads or values that are not finite."""
+    found, (route, slot, dtype, _, _, places, touches), sensors, expected = group
     assert route.grid is not None
     taxels, size = math.prod(route.grid), slot.length if slot.blob else slot.length * dtype.itemsize
     block = np.frombuffer(b"".join([packets[i] for i in found]), np.uint8).reshape(len(found), -1)
     raw = block[:, slot.run : slot.run + size].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
     finite = np.isfinite(values)
+    for at in touches:
+        finite = np.concatenate([finite, np.isfinite(block[:, at : at + 8].view(">f4"))], axis=1)
     heads = np.concatenate([block[:, begin:end] for begin, end in places], axis=1)
     counters = tags = None
     if route.counted:

@@ -298,7 +298,8 @@ def _any_packet(rng: np.random.Generator, sensor: str, grid: tuple[int, int], fo
     if form == 2:
         return rng.bytes(40) if rng.random() < 0.2 else trajectory((1, 2.0, 3.0), sensor=sensor)
     packet = pressure(values, counter, sensor)
-    touches = [trajectory(*[(1, 2.0, 3.0)] * int(rng.random() < 0.2), sensor=sensor)]
+    finger = (1, 2.0, math.nan if rng.random() < 0.2 else 3.0)
+    touches = [trajectory(*[finger] * int(rng.random() < 0.2), sensor=sensor)]
     return packet if form == 3 else encoding.bundle([packet, *touches], float(rng.integers(1, 2**31)))
 
 

@@ -18,6 +18,7 @@ for _ in range(40):
 RUBBISH = {  # what else a packet may be, and by which reason it is refused, tests/core/test_wire.py and test_osc.py say
     "text": (b"GET / HTTP/1.1\r\n\r\n", "not_osc"),
     "not finite": (encoding.message("/bad/pressure", "f" * 81, (NAN,)), "not_finite"),
+    "a finger that is nowhere": (encoding.message("/bad/trajectory", "iff", (1, math.nan, 2.0)), "not_finite"),
     "unknown address": (encoding.message("/bad/humidity", "f", (1.0,)), "address"),
     "negative bundle element": (b"#bundle\0" + bytes(7) + b"\1" + struct.pack(">i", -4) + bytes(4), "bundle"),
     "deep nesting": (nested, "bundle"),

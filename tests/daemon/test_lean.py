@@ -1,5 +1,6 @@
 """A scene pays for what it uses and for nothing else: what real daemons import, map, open and start."""
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -111,19 +112,20 @@ def test_the_forest_alone_opens_no_network(used: Used) -> None:
     assert daemon.client().hello["model"] == "touch_pattern_rf"
 
 
-def test_finger_positions_are_passed_over(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The daemon reads no trajectory. One with wrong type tags, or with too many fingers, is counted as dropped."""
+def test_finger_positions_are_not_kept(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trajectories wait for no frame. What is wrong with one is counted as dropped."""
 
-    def trajectory(sensor: str, types: str = "iffiff") -> bytes:
-        return encoding.message(f"/{sensor}/trajectory", types, ([1, 4.0, 4.0] * 5)[: len(types)])
+    def trajectory(sensor: str, types: str = "iffiff", y: float = 4.0) -> bytes:
+        return encoding.message(f"/{sensor}/trajectory", types, ([1, 4.0, y] * 5)[: len(types)])
 
     parts = Parts(model)
-    monkeypatch.setattr(wire, "_touches", None)  # nobody calls it
+    monkeypatch.setattr(wire.Decoder, "_join", None)  # nobody calls it
     frame = floats("/armrest/pressure", Hand().frame(), 0)
     for n in range(100):
         together = [trajectory(f"s{n}"), frame, trajectory("armrest"), trajectory(f"s{n}", "iff" * 5)]
+        together.append(trajectory("armrest", y=math.nan))
         packets = [encoding.bundle(together, 1.7e9 + n), trajectory(f"ghost{n}"), trajectory("armrest", "fff")]
         parts.desk.take(parts.hub.receive([(packet, SOURCE) for packet in packets], n / 15))
     assert parts.metrics.frames.values == {("armrest", "ok"): 100}
-    assert parts.metrics.dropped.values == {("too_many_touches",): 100, ("types",): 100}
+    assert parts.metrics.dropped.values == {(why,): 100 for why in ("too_many_touches", "not_finite", "types")}
     assert list(parts.hub.readings(0.0)) == ["armrest"]
