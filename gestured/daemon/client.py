@@ -22,7 +22,6 @@ from gestured.daemon.metrics import Metrics
 BACKLOG_BYTES = 256 << 10  # the most bytes that wait for one client; beyond them the oldest lines are dropped
 READ_BYTES = 1024  # the most bytes of one read; few, so that a client that sends rubbish waits its turn
 TURNS = 20  # reads and answers of one client in a second; further ones wait for the next second
-RUBBISH = 100  # bad lines in a row after which a client is cut off; with TURNS they take some seconds
 
 Finger = tuple[str, int, int]  # sensor, id of the contact, number of the finger
 
@@ -37,7 +36,6 @@ class _Server(Protocol):
     def subscribe(self, client: "Client", subscription: Subscription) -> None: ...
     def queue(self, client: "Client") -> None: ...
     def check(self, client: "Client") -> None: ...
-    def cut_off(self, client: "Client", reason: str) -> None: ...
     def remove(self, client: "Client") -> None: ...
 
 
@@ -57,7 +55,6 @@ class Client:
         self.turns = TURNS  # turns that it has left in this second
         self._request = bytearray()  # a line that is not complete
         self._asked: deque[bytes] = deque()  # requests that wait for an answer
-        self._rubbish = 0  # bad lines since the last good one
 
     @property
     def backlog(self) -> int:
@@ -126,14 +123,10 @@ class Client:
             return
         *lines, rest = data.split(b"\n")
         for line in lines:
-            self._request += line
-            if self._request.strip():
-                self._asked.append(bytes(self._request))
+            self._asked.append(bytes(self._request + line))
             self._request.clear()
         self._request += rest
-        if len(self._request) > MAX_LINE:
-            del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
-            self._refuse()
+        del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
         self.go_on()
 
     def answer(self) -> None:
@@ -141,10 +134,8 @@ class Client:
         self.turns -= 1
         try:
             self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.known()))
-            self._rubbish = 0
         except ProtocolError as error:
             self.send(messages.error_json(str(error)))
-            self._refuse()
         self.go_on()
 
     def go_on(self) -> None:
@@ -160,11 +151,6 @@ class Client:
         used_up, self.turns = self.turns <= 0, TURNS
         if used_up:
             self.go_on()
-
-    def _refuse(self) -> None:
-        self._rubbish += 1
-        if self._rubbish > RUBBISH:
-            self._server.cut_off(self, "rubbish")
 
     def _write(self, line: bytes) -> bytes | None:
         """Send a line. Returns what the socket did not take, or None if it took everything (or is gone)."""

@@ -103,13 +103,8 @@ class EventServer:
                 self.remove(client)
                 return
         if client.blocked_since is not None and time.monotonic() - client.blocked_since > STALLED_S:
-            self.cut_off(client, "stalled")
-
-    def cut_off(self, client: Client, reason: str) -> None:
-        """Remove a client that misuses its connection, count it and log the reason."""
-        if client in self._clients:
-            self.metrics.evicted.add(reason)
-            self._throttle.warn("client cut off", reason)
+            self.metrics.evicted.add("stalled")
+            self._throttle.warn("client cut off", "stalled")
             self.remove(client)
 
     def queue(self, client: Client) -> None:

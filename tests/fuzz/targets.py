@@ -112,9 +112,6 @@ class _Server:
         client.turns += 1  # as many as it likes
         self.queued.append(client)
 
-    def cut_off(self, client: object, reason: str) -> None:
-        """Not here."""
-
 
 def request(data: bytes) -> None:
     """Lines of a client are answered one by one, however they are cut into chunks: the first bytes say how."""
@@ -128,8 +125,7 @@ def request(data: bytes) -> None:
     wanted, refused = [], []
     for line in lines:
         try:
-            if line.strip():
-                wanted.append(parse_subscription(line, {"gestures": GESTURES}))
+            wanted.append(parse_subscription(line, {"gestures": GESTURES}))
         except ProtocolError as error:
             assert error.reason == "subscription"
             refused.append(str(error))
