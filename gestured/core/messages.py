@@ -12,7 +12,7 @@ from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Event, Gesture, Place, Provisional, Status, Touch, Unknown, Where
 
-MAX_LINE = 4096  # bytes of a client's request
+MAX_LINE = 16_384  # bytes of a client's request: room for 64 sensors, zones and gestures with the longest names
 LONGEST = 60  # the most characters of what a peer sent that an answer quotes
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
 STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since", "t"))

@@ -7,7 +7,7 @@ import pytest
 
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Gesture, Onset, Place, Release, Status, Where
-from gestured.core.messages import Subscription, error_json, parse_subscription
+from gestured.core.messages import MAX_LINE, Subscription, error_json, parse_subscription
 
 GESTURE = Gesture("armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False, {"swipe_up": 1.0})
 
@@ -53,7 +53,7 @@ def test_a_zone_is_asked_for_where_something_has_a_place() -> None:
         (b"", "JSON"),
         (b"\xff", "UTF-8"),
         (b"[" * 4000, "JSON"),
-        (b" " * 5000, "4096"),
+        (b" " * (MAX_LINE + 1), str(MAX_LINE)),
         (b"[]", '"subscribe"'),
         (b"{}", '"subscribe"'),
         (b'{"subscribe":[]}', '"subscribe"'),

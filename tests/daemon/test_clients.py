@@ -178,13 +178,26 @@ async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> 
     await server.close(0)
 
 
+async def test_a_request_may_name_as_many_sensors_as_there_are_by_default(listener) -> None:
+    server = serve(listener)
+    names = [f"{n:064}" for n in range(64)]  # the longest
+    with connect(listener) as client:
+        client.send(json.dumps({"subscribe": {"sensors": names}}).encode() + b"\n")
+        for _ in range(10):
+            await turn()
+        with pytest.raises(BlockingIOError):
+            client.recv(1 << 16)
+        assert [each.subscription.sensors for each in server._clients] == [frozenset(names)]
+    await server.close(0)
+
+
 async def test_each_bad_line_is_answered_and_the_connection_goes_on(listener) -> None:
     server = serve(listener)
-    bad = [b"?", b"", b" \r", b"[" * 4000, b"?" * 9000] * 30  # some are too long for one read, or for any request
+    bad = [b"?", b"", b" \r", b"[" * 4000, b"?" * 20_000] * 30  # some are too long for one read, or for any request
     with connect(listener) as rude:
         for line in bad:
             rude.send(line + b"\n")
-            for _ in range(10):  # more reads than the longest line takes
+            for _ in range(25):  # more reads than the longest line takes
                 await turn()
                 server.tick()
             assert json.loads(rude.recv(1 << 16))["type"] == "error"

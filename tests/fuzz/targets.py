@@ -14,7 +14,7 @@ import numpy as np
 
 from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
-from gestured.core.messages import parse_subscription
+from gestured.core.messages import MAX_LINE, parse_subscription
 from gestured.core.stamping import Stamper
 from gestured.core.wire import FEW, Addresses, Arrival, Decoder
 from gestured.daemon.client import Client
@@ -136,11 +136,11 @@ def request(data: bytes) -> None:
         client.read()
         while server.queued:
             server.queued.pop().answer()
-        assert len(client._request) <= 4097
+        assert len(client._request) <= MAX_LINE + 1
     assert server.subscribed == wanted
     answers = [json.loads(line) for line in sock.sent]
     assert [answer["type"] for answer in answers] == ["error"] * len(refused)
-    long = ("a request has at most",)  # how many bytes it had is not known to a reader that keeps 4097
+    long = ("a request has at most",)  # how many bytes it had is not known to a reader that keeps no more
     for answer, reason in zip(answers, refused, strict=True):
         assert answer["reason"] == reason or (answer["reason"].startswith(long) and reason.startswith(long))
 
