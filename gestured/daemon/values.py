@@ -16,6 +16,7 @@ SWITCH, NUMBER, COUNT = "true or false", "a number", "a whole number"
 # What was expected, by pydantic's type of an error, for errors whose own message speaks of Python's types.
 WORDS = {
     "tuple_type": "a list",
+    "too_long": "four numbers",  # of a zone; no other list has a length of its own
     "string_too_short": "a text that is not empty",
     **dict.fromkeys(("string_type", "string_unicode"), "a text"),
     **dict.fromkeys(("bool_type", "bool_parsing"), SWITCH),

@@ -215,6 +215,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ("max_sensors = '3'", ("max_sensors = '3'", "gestured.toml", "expected a whole number")),
         ("sensors.arm.mirror = 'true'", ("sensors.arm.mirror = 'true'", "expected true or false")),
         ("sensors.arm.zones.a.at = ['0', 0, 1, 1]", ("sensors.arm.zones.a.at.0 = '0'", "expected a number")),
+        ("sensors.arm.zones.a.at = [0, 0, 1, 1, 1]", ("sensors.arm.zones.a.at = [", "expected four numbers")),
         ("sensors.arm.zones.a.at = [0, 0, 1, true]", ("sensors.arm.zones.a.at.3 = True", "expected a number")),
         ("sensors = 5", ("sensors = 5", "expected a table [sensors]")),
         ("max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
