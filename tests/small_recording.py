@@ -1,4 +1,4 @@
-"""Two small recordings, and what tests do with them."""
+"""Small recordings, and what tests do with them."""
 
 import io
 import zipfile
@@ -10,6 +10,7 @@ import pytest
 
 from gestured.core.errors import RecordingError
 from gestured.record.arrays import read
+from gestured.record.judge import NONE
 from gestured.record.recordings import Recordings
 
 FIELDS = [field.name for field in fields(Recordings)]
@@ -49,6 +50,12 @@ def session() -> Recordings:
         event_onsets=np.array([0.0, 0.1, 0.3]),
         event_offsets=np.array([0.1, 0.3, 0.5]),
     )
+
+
+def untouched(times: np.ndarray) -> Recordings:
+    """One of a sensor of 9 x 9 that nobody touches."""
+    frames, offsets = np.zeros((len(times), 9, 9), np.uint8), np.array([0, len(times)])
+    return Recordings(frames, times, offsets, labels=np.array([NONE]), subjects=np.array([0]))
 
 
 def same(one: Recordings, other: Recordings) -> None:

@@ -20,7 +20,7 @@ from gestured.core.sensor import ABSENT_S
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.record.arrays import read, write
-from gestured.record.judge import NONE, Performed
+from gestured.record.judge import Performed
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES
 from tests.core import test_gates, test_hub
@@ -28,6 +28,7 @@ from tests.daemon import tiny_model
 from tests.daemon.harness import Hand
 from tests.lab.adapt.recorded import whole_session
 from tests.small_model import operating_points
+from tests.small_recording import untouched
 
 NAMES = ("one_tap", "swipe_left", "swipe_right")
 
@@ -185,9 +186,7 @@ def test_an_hour_of_a_tape_is_an_hour_of_each_of_its_sensors(models: dict[bool, 
 
 
 def test_a_night_in_a_recording_without_frames_shows_nothing_either(models: dict[bool, Model], tmp_path: Path) -> None:
-    times = np.concatenate([np.arange(600) / 15, 36_000 + np.arange(600) / 15])
-    of = {"offsets": np.array([0, 1200]), "labels": np.array([NONE]), "subjects": np.zeros(1, int)}
-    write(tmp_path / "night.npz", Recordings(frames=np.zeros((1200, 9, 9), np.uint8), times=times, **of))
+    write(tmp_path / "night.npz", untouched(np.concatenate([np.arange(600) / 15, 36_000 + np.arange(600) / 15])))
     play(tmp_path / "night.npz", models[False], played := Played())
     assert played.seconds == pytest.approx(2 * 599 / 15 + ABSENT_S)
 

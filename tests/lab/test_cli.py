@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.lab.cli import FOLDERS, LAB_PACKAGES, main, parser
+from gestured.lab.cli import FOLDERS, LAB_PACKAGES, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 from gestured.simulator import NON_GESTURES, Participant, SimulatedSensor, generator, gesture_take
+from tests.lab.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -64,13 +65,12 @@ def test_hours_and_recordings_need_nothing_of_the_extra(line: str, says: str, tm
 
 @pytest.mark.parametrize("package", LAB_PACKAGES)
 def test_each_package_of_the_extra_is_named_where_it_is_missing(
-    package: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gestured.lab.cli.PROGRAMS", {"train": f"{package}.part"})
     monkeypatch.setitem(sys.modules, package, None)
-    assert main(["train"]) == 1
     said = f"gestured-lab: {package} is missing: pip install 'gestured[lab]', or make lab\n"
-    assert capsys.readouterr() == ("", said)
+    assert run("train") == (1, "", said)
 
 
 def test_help_needs_no_torch_and_shows_an_example_that_is_valid(tmp_path: Path) -> None:
@@ -94,11 +94,9 @@ def test_help_needs_no_torch_and_shows_an_example_that_is_valid(tmp_path: Path) 
         "adapt no.npz --out my.onnx --steps 0",
     ],
 )
-def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(line.split())
-    assert ended.value.code == 2
-    assert "usage: gestured-lab" in capsys.readouterr().err
+def test_arguments_that_mean_nothing_are_usage_errors(run: Run, line: str) -> None:
+    status, _, err = run(*line.split())
+    assert status == 2 and "usage: gestured-lab" in err
 
 
 @pytest.mark.parametrize(
@@ -117,11 +115,11 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
 )  # fmt: skip
 @pytest.mark.usefixtures("lab")
 def test_what_no_command_can_work_with_is_named(
-    line: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, line: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(line.split()) == 1
-    assert capsys.readouterr().err == f"gestured-lab: {reason}\n"
+    status, _, err = run(*line.split())
+    assert (status, err) == (1, f"gestured-lab: {reason}\n")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -135,7 +133,7 @@ def test_what_no_command_can_work_with_is_named(
 )  # fmt: skip
 @pytest.mark.usefixtures("lab")
 def test_a_folder_that_cannot_be_written_to_is_named_before_anything_is_simulated(
-    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
@@ -144,32 +142,28 @@ def test_a_folder_that_cannot_be_written_to_is_named_before_anything_is_simulate
     flag = line.split()[-1]
     words = f"gestured-lab: {flag}: expected a folder that can be read and written, found "
     for folder in ("taken", "taken/new", "shut", "shut/new"):
-        assert main([*line.split(), folder]) == 1
-        assert capsys.readouterr().err == f"{words}{folder}\n"
+        status, _, err = run(*line.split(), folder)
+        assert (status, err) == (1, f"{words}{folder}\n")
     assert {path.name for path in tmp_path.iterdir()} == {"taken", "shut"}
 
 
 @pytest.mark.parametrize(("name", "words"), [("study", "; what is finished is kept"), ("everyday", "")])
 def test_an_interrupted_run_says_where_nothing_finished_is_lost(
-    name: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, name: str, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(_: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("gestured.lab.cli.import_module", lambda _: argparse.Namespace(run=interrupt))
-    assert main([name]) == 130
-    assert capsys.readouterr().err == f"\ngestured-lab: interrupted{words}\n"
+    assert run(name) == (130, "", f"\ngestured-lab: interrupted{words}\n")
 
 
-def test_a_reader_who_has_gone_ends_a_command_as_by_head(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reader_who_has_gone_ends_a_command_as_by_head(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(_: object) -> int:
         raise BrokenPipeError(errno.EPIPE, "Broken pipe")
 
     monkeypatch.setattr("gestured.lab.cli.import_module", lambda _: argparse.Namespace(run=gone))
-    assert main(["everyday"]) == 0
-    assert capsys.readouterr() == ("", "")
+    assert run("everyday") == (0, "", "")
 
 
 @pytest.fixture
@@ -182,9 +176,7 @@ def _usual_signals() -> Iterator[None]:
 
 @pytest.mark.usefixtures("_usual_signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_whoever_asks_for_the_end_waits_for_imports(
-    number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_whoever_asks_for_the_end_waits_for_imports(run: Run, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     imported = []
 
     def importing(_: str) -> argparse.Namespace:
@@ -193,8 +185,7 @@ def test_whoever_asks_for_the_end_waits_for_imports(
         return argparse.Namespace(run=lambda _: 0)
 
     monkeypatch.setattr("gestured.lab.cli.import_module", importing)
-    assert main(["everyday"]) == 130
-    assert imported == ["whole"] and capsys.readouterr().err == "\ngestured-lab: interrupted\n"
+    assert run("everyday") == (130, "", "\ngestured-lab: interrupted\n") and imported == ["whole"]
 
 
 @pytest.mark.usefixtures("lab")
@@ -229,7 +220,7 @@ def test_a_log_on_a_full_disk_stops_nothing_and_a_terminal_need_not_have_all_let
 @pytest.mark.timeout(600)
 @pytest.mark.usefixtures("lab")
 def test_train_makes_three_models_and_evaluate_their_figures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Everything that `train` does, with a plan much smaller than --quick, in one process."""
     from gestured.lab import dataset, train
@@ -267,10 +258,10 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     monkeypatch.setattr(train, "_real", real)
     monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))
     out, cache = tmp_path / "models", tmp_path / "cache"
-    arguments = ["--cache", str(cache), "--jobs", "1", "--quick"]
+    arguments = ("--cache", cache, "--jobs", 1, "--quick")
 
-    assert main(["train", "--out", str(out), *arguments]) == 0
-    assert "trained in" in capsys.readouterr().err
+    status, _, err = run("train", "--out", out, *arguments)
+    assert status == 0 and "trained in" in err
     manifest = json.loads((out / "manifest.json").read_text())["models"]
     assert sorted(manifest) == sorted(f"{name}.onnx" for name in LADDER)
     for name in LADDER:
@@ -282,14 +273,14 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     before = {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))}
     for step in ("pretrain", "finetune"):
         monkeypatch.setattr(train, step, lambda *_: pytest.fail("what is done is not done again"))
-    capsys.readouterr()
     page = tmp_path / "figures.md"
     page.write_text("<!-- figures: begin -->\n<!-- figures: end -->\n")
     monkeypatch.setattr("gestured.lab.evaluate.FEWEST", 1)
     front = tmp_path / "README.md"
     front.write_text("<!-- worst: begin -->\n<!-- worst: end -->\n")
-    assert main(["evaluate", "--models", str(out), *arguments, "--document", str(page), str(front), "--json"]) == 0
-    figures = json.loads(capsys.readouterr().out)
+    status, said, _ = run("evaluate", "--models", out, *arguments, "--document", page, front, "--json")
+    figures = json.loads(said)
+    assert status == 0
     assert figures.keys() == set(LADDER)
     bought = "with non-gestures, learned from simulation alone"
     assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures", bought}

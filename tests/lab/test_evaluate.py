@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from gestured.lab import commands, evaluate
-from gestured.lab.cli import main
 from gestured.lab.evaluate import outcome, worst
 from gestured.lab.export import write_manifest
 from gestured.lab.fit import CLASSES
@@ -17,6 +16,7 @@ from gestured.lab.intervals import CONFIDENCE_LEVEL, student
 from gestured.lab.samples import Samples
 from gestured.lab.train import MIXED
 from gestured.model.shipped import LADDER
+from tests.lab.conftest import Run
 from tests.small_model import build
 
 THREE = np.eye(3, dtype=np.float32)
@@ -120,7 +120,7 @@ def share(right: float) -> dict[str, object]:
 
 
 def test_without_real_recordings_their_figures_stay_of_the_same_files_and_no_network_is_needed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in LADDER:
         build(tmp_path / f"{name}.onnx")
@@ -132,15 +132,13 @@ def test_without_real_recordings_their_figures_stay_of_the_same_files_and_no_net
     monkeypatch.setattr(commands, "simulated_figures", lambda *_: dict.fromkeys(LADDER, {"wide": share(0.5)}))
     for module in (commands, evaluate):
         monkeypatch.setattr(module, "learn", lambda *_: pytest.fail("learns what nothing asks for"), raising=False)
-    line = ["evaluate", "--models", str(tmp_path), "--cache", str(tmp_path / "cache")]
+    line = ("evaluate", "--models", tmp_path, "--cache", tmp_path / "cache")
     stood = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert main([*line, "--quick"]) == 0
-    assert "cards and manifest stay as they are" in capsys.readouterr().err
+    status, _, err = run(*line, "--quick")
+    assert status == 0 and "cards and manifest stay as they are" in err
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == stood
-    assert main(line) == 0
-    assert (
-        "left out, since no --real FOLDER was named; their figures of the same models stay" in capsys.readouterr().err
-    )
+    status, _, err = run(*line)
+    assert status == 0 and "left out, since no --real FOLDER was named; their figures of the same models stay" in err
     manifest = json.loads((tmp_path / "manifest.json").read_text())["models"]
     for name in LADDER:
         card, figures = (tmp_path / f"{name}.md").read_text(), manifest[f"{name}.onnx"]["figures"]

@@ -3,7 +3,8 @@
 import errno
 import json
 import os
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,7 +20,6 @@ from gestured.core.frames import Frame
 from gestured.core.listening import Arming
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import ABSENT_S, Sensor
-from gestured.lab.cli import main
 from gestured.lab.digest import file_digest
 from gestured.lab.everyday import FIRST, command
 from gestured.lab.everyday.hours import FEW, HELD, LEVELS, NOT_READY, RESTARTING, Heard, hear, judged, points_of
@@ -33,7 +33,9 @@ from gestured.record.check import UNNAMED
 from gestured.record.judge import NONE, Performed, Said
 from gestured.record.recordings import Recordings
 from gestured.record.replay import Replay, opened
+from tests.lab.conftest import Run
 from tests.small_model import GESTURES, STRICTER, build, operating_points
+from tests.small_recording import untouched
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT_S = 240.0
@@ -45,18 +47,26 @@ def afternoon() -> Heard:
     return hear(lived(FIRST, SHORT_S), command.rungs("cnn_lstm"), "normal")
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: object, apart: bool = False) -> dict[str, Any]:
-    """What the command says, in this process or, `apart`, in one of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        if not apart:
-            patch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
-        assert main(["everyday", "--json", "--jobs", "1", *map(str, arguments)]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return found
+@pytest.fixture
+def everyday(run: Run) -> Run:
+    """The command: exit status, standard output, standard error."""
+    return partial(run, "everyday", "--jobs", 1)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command starts no processes."""
+    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
+
+
+@pytest.fixture
+def said(everyday: Run, here: None) -> Callable[..., Any]:
+    """What the command says as JSON."""
+    return lambda *arguments: json.loads(everyday("--json", *arguments)[1])
 
 
 def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, said: Callable[..., Any]
 ) -> None:
     one = session(9100, "nominal", 60.0, 0.0)
     events = one["events"]
@@ -76,51 +86,40 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
     for name in (UNNAMED, "knock"):  # nobody knows what it was, or it is a gesture of the user's own, to be enrolled
         marks["event_labels"] = np.full(len(events), name)
         write(tmp_path / f"{name}.npz", Recordings(**dict(silent.present()), **marks))
-        found = said(capsys, "--recordings", tmp_path / f"{name}.npz")
+        found = said("--recordings", tmp_path / f"{name}.npz")
         assert (found["meant"], found["false_per_hour"], found["provisional_false_per_hour"]) == (0, 0.0, 0.0)
-    unknown = said(capsys, "--recordings", tmp_path / "silent.npz")
-    known = said(capsys, "--recordings", tmp_path / "told.npz")
+    unknown = said("--recordings", tmp_path / "silent.npz")
+    known = said("--recordings", tmp_path / "told.npz")
     assert known["right"] > 0.8 and known["false_per_hour"] < 0.2 * unknown["false_per_hour"]
     assert unknown["false_per_hour"] * unknown["hours"] >= 0.8 * len(events)
     assert (unknown["meant"], unknown["right"]) == (0, None) and known["meant"] == len(events)
 
 
 def test_a_recording_of_one_frame_is_no_place_and_a_blink_is_no_hour(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, everyday: Run, said: Callable[..., Any]
 ) -> None:
-    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
     for name, count, rate_hz in (("one", 1, 15.0), ("blink", 300, 1e6), ("good", 60, 15.0)):
-        frames, of = np.zeros((count, 9, 9), np.uint8), {"labels": np.array([NONE]), "subjects": np.array([0])}
-        offsets = np.array([0, count])
-        write(
-            tmp_path / f"{name}.npz", Recordings(frames=frames, times=np.arange(count) / rate_hz, offsets=offsets, **of)
-        )
-    found = said(capsys, "--recordings", tmp_path / "one.npz", tmp_path / "good.npz")
+        write(tmp_path / f"{name}.npz", untouched(np.arange(count) / rate_hz))
+    found = said("--recordings", tmp_path / "one.npz", tmp_path / "good.npz")
     assert list(found["places"]) == ["good"] and found["hours"] == round(59 / 15 / 3600, 4)
-    assert main(["everyday", "--jobs", "1", "--recordings", str(tmp_path / "blink.npz")]) == 1
-    assert "blink.npz: expected at least 1 s of frames" in capsys.readouterr().err
+    status, _, err = everyday("--recordings", tmp_path / "blink.npz")
+    assert status == 1 and "blink.npz: expected at least 1 s of frames" in err
 
 
-def test_a_night_in_which_a_sensor_sent_nothing_shows_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_night_in_which_a_sensor_sent_nothing_shows_nothing(tmp_path: Path, said: Callable[..., Any]) -> None:
     """Not that nothing false is said in it."""
-    times = np.concatenate([np.arange(600) / 15, 36_000 + np.arange(600) / 15])
-    offsets, of = np.array([0, 1200]), {"labels": np.array([NONE]), "subjects": np.array([0])}
-    write(
-        tmp_path / "night.npz", Recordings(frames=np.zeros((1200, 9, 9), np.uint8), times=times, offsets=offsets, **of)
-    )
-    found = said(capsys, "--recordings", tmp_path / "night.npz")
+    write(tmp_path / "night.npz", untouched(np.concatenate([np.arange(600) / 15, 36_000 + np.arange(600) / 15])))
+    found = said("--recordings", tmp_path / "night.npz")
     assert found["hours"] == round((2 * 599 / 15 + ABSENT_S) / 3600, 4)
 
 
-def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.CaptureFixture[str]) -> None:
+def test_of_a_tape_all_that_the_daemon_would_publish_is_false(everyday: Run) -> None:
     path = ROOT / "docs" / "demo.mcap"
     tape, maker = opened(path)
     (model, *_) = command.rungs("cnn_lstm")
     events = list(Replay(tape, maker.scene, model).events())
     names = [event.gesture for event in events if isinstance(event, Gesture)]
-    found = said(capsys, "--recordings", path, apart=True)
+    found = json.loads(everyday("--json", "--recordings", path)[1])  # by a process of its own
     assert {name: of["false"] for name, of in found["gestures"].items() if of["false"]} == {
         name: names.count(name) for name in names
     }
@@ -128,15 +127,12 @@ def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.Cap
     assert found["contacts"] == onsets
 
 
-def test_tapes_of_one_name_in_two_folders_are_not_one_person(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
+def test_tapes_of_one_name_in_two_folders_are_not_one_person(tmp_path: Path, said: Callable[..., Any]) -> None:
     paths = [tmp_path / folder / "day.mcap" for folder in ("monday", "tuesday")]
     for path in paths:
         path.parent.mkdir()
         path.write_bytes((ROOT / "docs" / "demo.mcap").read_bytes())
-    assert said(capsys, "--recordings", *paths)["people"] == 2
+    assert said("--recordings", *paths)["people"] == 2
 
 
 @pytest.mark.parametrize("lived", [lambda: lived(FIRST, SHORT_S), lambda: foreign_lived("nominal", FIRST)])
@@ -228,19 +224,20 @@ def test_where_a_sensor_is_deaf_is_told() -> None:
 
 
 def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, everyday: Run, said: Callable[..., Any]
 ) -> None:
     path = build(tmp_path / "mine.onnx", operating_points=operating_points())
-    found = said(capsys, path, "--strictness", "strict", "--recordings", ROOT / "docs" / "demo.mcap")
+    found = said(path, "--strictness", "strict", "--recordings", ROOT / "docs" / "demo.mcap")
     assert list(found["points"]) == ["mine"] and list(found["gestures"]) == list(GESTURES)  # others know other gestures
     points = found["points"]["mine"]
     assert list(points) == list(STRICTER) and points["strict"]["false_per_hour"] == found["false_per_hour"]
     assert points["strict"]["false_per_hour"] <= points["eager"]["false_per_hour"] > 0
     build(tmp_path / "old.onnx")
-    assert main(["everyday", str(tmp_path / "old.onnx"), "--strictness", "strict"]) == 1
-    assert "--strictness strict: old has no operating points, expected normal" in capsys.readouterr().err
+    status, _, err = everyday(tmp_path / "old.onnx", "--strictness", "strict")
+    assert status == 1 and "--strictness strict: old has no operating points, expected normal" in err
 
 
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
@@ -249,23 +246,19 @@ def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused
         (["--recordings", "a.npz", "./a.npz"], "a.npz: expected each file once"),
     ],
 )
-def test_what_cannot_be_is_said_in_one_sentence(
-    flags: list[str], words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(command, "in_processes", lambda make, todo, *_: map(make, todo))
-    assert main(["everyday", *flags]) == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab: ")]
-    assert words in line
+def test_what_cannot_be_is_said_in_one_sentence(everyday: Run, flags: list[str], words: str) -> None:
+    status, _, err = everyday(*flags)
+    (line,) = [line for line in err.splitlines() if line.startswith("gestured-lab: ")]
+    assert status == 1 and words in line
 
 
-def test_the_page_and_the_picture_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_and_the_picture_are_written(tmp_path: Path, everyday: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
     page, curve = tmp_path / "page.md", tmp_path / "curve.svg"
     page.write_text("before\n<!-- everyday: begin -->\nold\n<!-- everyday: end -->\nafter\n")
-    assert main(["everyday", "--document", str(page), "--svg", str(curve)]) == 0
-    printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
+    status, out, _ = everyday("--document", page, "--svg", curve)
+    printed = [line for line in out.splitlines() if line.startswith("| ")]
+    assert status == 0
     lines = page.read_text().splitlines()
     assert [line for line in lines if line.startswith("| ")] == printed and (lines[0], lines[-1]) == ("before", "after")
     match = LINE.fullmatch(lines[2])
@@ -278,39 +271,40 @@ def test_the_page_and_the_picture_are_written(
 
 
 def test_a_page_names_the_file_that_was_judged_also_where_a_shipped_one_is_called_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, everyday: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mine = build(tmp_path / "lstm.onnx")
     quiet = Heard("table", "a", 0, [], {"lstm": []}, 1800.0)
     monkeypatch.setattr(command, "in_processes", lambda *_: [[quiet]])
     page = tmp_path / "page.md"
     page.write_text("<!-- everyday: begin -->\n<!-- everyday: end -->\n")
-    assert main(["everyday", str(mine), "--document", str(page)]) == 0
+    assert everyday(mine, "--document", page)[0] == 0
     match = LINE.fullmatch(page.read_text().splitlines()[1])
     assert match and match[2] == f"lstm.onnx {file_digest(mine)[:12]}"
 
 
 def test_a_disk_without_room_for_the_picture_takes_no_figures_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, everyday: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
     monkeypatch.setattr(os, "fsync", full)
-    assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 1
-    out, err = capsys.readouterr()
-    assert "### By gesture" in out and list(tmp_path.iterdir()) == []
+    status, out, err = everyday("--svg", tmp_path / "curve.svg")
+    assert status == 1 and "### By gesture" in out and list(tmp_path.iterdir()) == []
     assert err == f"gestured-lab: {tmp_path}/curve.svg: No space left on device\n"
 
 
-def test_a_reader_who_has_gone_takes_no_file_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reader_who_has_gone_takes_no_file_away(
+    tmp_path: Path, everyday: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def gone(*_: object, **__: object) -> None:
         raise BrokenPipeError
 
     monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
     monkeypatch.setattr("gestured.lab.written.say_drawn", gone)
-    assert main(["everyday", "--svg", str(tmp_path / "curve.svg")]) == 0
+    assert everyday("--svg", tmp_path / "curve.svg")[0] == 0
     assert (tmp_path / "curve.svg").exists()
 
 

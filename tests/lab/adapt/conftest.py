@@ -1,6 +1,6 @@
 """A small simulated world in place of the thousands of takes that `adapt` cuts, and a trained model to start from."""
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,6 @@ from gestured.lab import export
 from gestured.lab.adapt import command
 from gestured.lab.adapt.learning import Simulated
 from gestured.lab.adapt.weights import untrained
-from gestured.lab.cli import main
 from gestured.lab.dataset import from_take
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
@@ -19,9 +18,8 @@ from gestured.lab.own import learn as own
 from gestured.lab.samples import WINDOW, Samples, collect
 from gestured.model.context import NAMES
 from gestured.simulator import GESTURES, wide
+from tests.lab.conftest import Run
 from tests.lab.test_own import drawn
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 def some(seed: int, count: int) -> Samples:
@@ -58,14 +56,7 @@ def little(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.fixture
-def run(
-    little: None, base: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Run:
+def run(little: None, base: Path, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
     """Run `adapt` in a folder of its own; gives the exit status, and what it printed."""
     monkeypatch.chdir(tmp_path)
-
-    def adapt(*arguments: object) -> tuple[int, str, str]:
-        status = main(["adapt", "--base", str(base), *map(str, arguments)])
-        return status, *capsys.readouterr()
-
-    return adapt
+    return partial(run, "adapt", "--base", base)

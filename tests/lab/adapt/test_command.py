@@ -26,8 +26,8 @@ from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
-from tests.lab.adapt.conftest import Run
 from tests.lab.adapt.recorded import cut_gestures, unknown_sensor
+from tests.lab.conftest import Run
 from tests.lab.test_own import drawn
 
 
@@ -128,7 +128,7 @@ def test_where_it_is_no_better_nothing_is_written(run: Run, tmp_path: Path) -> N
 
 
 def test_a_disk_without_room_for_the_model_takes_no_figures_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", "my.onnx")
@@ -142,8 +142,8 @@ def test_a_disk_without_room_for_the_model_takes_no_figures_away(
     monkeypatch.setattr(command, "adapt", lambda *_: Better())
     monkeypatch.setattr(command, "_tell", lambda *_: print("right 0.9"))
     monkeypatch.setattr(command, "_write", full)
-    assert main(["adapt", "a.npz", "--cache", str(tmp_path), "--out", str(tmp_path / "my.onnx")]) == 1
-    assert capsys.readouterr() == ("right 0.9\n", "gestured-lab: my.onnx: No space left on device\n")
+    said = "right 0.9\n", "gestured-lab: my.onnx: No space left on device\n"
+    assert run("a.npz", "--cache", tmp_path, "--out", "my.onnx") == (1, *said)
 
 
 @pytest.mark.parametrize(

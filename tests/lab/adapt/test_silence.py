@@ -15,8 +15,8 @@ from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.record.tape_writer import Writer
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
-from tests.lab.adapt.conftest import Run
 from tests.lab.adapt.recorded import cut_gestures
+from tests.lab.conftest import Run
 
 SILENCE = "silence"
 TAUGHT = [name for name in GESTURES if name != "swipe_up"]

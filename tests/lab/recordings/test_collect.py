@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from gestured.core.errors import RecordingError
-from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
 from tests.control.pages import Page
+from tests.lab.conftest import Run
 from tests.small_recording import example
 from tests.sockets import free_address
 from tests.terminal import Terminal
@@ -164,14 +164,11 @@ def test_a_silent_sensor_is_told_and_ctrl_c_leaves_the_terminal_as_it_was(tmp_pa
         assert person.ends() == 130
 
 
-def test_without_a_terminal_it_says_what_it_needs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_terminal_it_says_what_it_needs(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["collect", "--participant", "07"]) == 1
-    assert capsys.readouterr().err == (
-        "gestured-lab: collect talks with a person: expected a terminal as standard input and output\n"
-    )
+    status, _, err = run("collect", "--participant", "07")
+    said = "gestured-lab: collect talks with a person: expected a terminal as standard input and output\n"
+    assert (status, err) == (1, said)
     assert os.listdir(tmp_path) == []
 
 
@@ -180,11 +177,9 @@ def test_without_a_terminal_it_says_what_it_needs(
     [("--participant", "Anna Meier"), ("--gestures", "one_tap,Wave"), ("--gestures", "swipe_lft"), ("--grid", "1x9"),
      ("--repeats", "0"), ("--seed", "-1"), ("--countdown", "x"), ("--listen", "9000"), ("--sensor", "a/b")],
 )  # fmt: skip
-def test_flags_are_checked(flag: str, value: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["collect", "--participant", "07", flag, value])
-    assert ended.value.code == 2
-    assert "expected" in capsys.readouterr().err
+def test_flags_are_checked(run: Run, flag: str, value: str) -> None:
+    status, _, err = run("collect", "--participant", "07", flag, value)
+    assert status == 2 and "expected" in err
 
 
 def test_a_file_that_is_somebody_elses_or_another_sensors_is_left_alone(tmp_path: Path) -> None:
