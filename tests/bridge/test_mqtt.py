@@ -509,19 +509,6 @@ def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broke
     assert retained(listen, at)["gestured/car/availability"] == "online"
 
 
-def test_after_a_pause_of_the_bridge_old_events_are_not_sent(bridge, broker, listen, fake):
-    at = broker()
-    process = started(bridge, at, fake)
-    listener = listen(at.port, "gestured/car/armrest/gesture")
-    fake.say(gesture(1))
-    listener.events(1)
-    process.process.send_signal(signal.SIGSTOP)
-    fake.say(gesture(2, decided=gesture(2)["decided"] - 1.5))  # as if it had waited in the socket for so long
-    process.process.send_signal(signal.SIGCONT)
-    fake.say(gesture(3))
-    assert listener.events(1)[0]["sequence"] == 3
-
-
 def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
     at = broker()
     listener = listen(at.port, "gestured/car/armrest/gesture")

@@ -153,6 +153,8 @@ def test_strangers_cost_the_same_however_many_sensors_there_are() -> None:
     kept = Hub(replace(SCENE, sensors={"arm": Setup()}, max_sensors=1), Sure())  # there is no place for any stranger
     (dropped,) = kept.receive([(floats("/x0/pressure", frame, 0), STRANGER)], 1.0)
     assert isinstance(dropped, Dropped) and dropped.reason == "too_many_sensors"
+    (new, *_) = kept.receive([(floats("/arm/pressure", frame, 0), FIRST)], 1.0)
+    assert isinstance(new, Changed) and new.what == "new"
 
 
 @pytest.mark.parametrize("what", ["restart", "change"])

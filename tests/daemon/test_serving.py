@@ -50,18 +50,6 @@ def test_status_comes_by_itself_and_names_each_sensor(shared: Daemon) -> None:
     client.until(lambda line: line["sensors"]["living"] == "stale")
 
 
-def test_a_sensor_that_falls_silent_is_answered(shared: Daemon) -> None:
-    client = shared.client().subscribe("gesture", "cancelled", "release", sensors=["mute_tap", "mute_press"])
-    tapped, pressed = Sensor(shared, "mute_tap").begin(), Sensor(shared, "mute_press").begin()
-    tapped.send(tapped.hand.tap(), tapped.hand.idle(0.2))  # a second tap may come, but nothing does
-    pressed.send(pressed.hand.tap())
-    lines = [client.line() for _ in range(4)]
-    assert {(e["sensor"], e["type"], e.get("gesture", e.get("reason"))) for e in lines} == {
-        ("mute_tap", "gesture", "one_tap"), ("mute_tap", "release", None),
-        ("mute_press", "cancelled", "silence"), ("mute_press", "release", None),
-    }  # fmt: skip
-
-
 def test_other_firmware_has_other_addresses_and_another_grid(start, tmp_path: Path) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(

@@ -343,19 +343,6 @@ def test_a_model_that_cannot_be_used(tmp_path: Path) -> None:
     assert not (tmp_path / "s").exists()
 
 
-def test_a_fallback_answers_where_the_first_model_cannot(start, model: Path, tmp_path: Path) -> None:
-    broken = tmp_path / "broken.onnx"
-    broken.write_bytes(model.read_bytes()[:1000])
-    daemon = start("--fallback", model, "--clock", "sensor", "--stale-s", 30, model=broken)
-    assert daemon.ready["model"] == "tiny"
-    client = daemon.client()
-    Sensor(daemon, "arm").begin().perform("left")
-    (event,) = client.events("gesture", "arm")
-    assert (event["model"], event["degraded"], event["gesture"]) == ("tiny", True, "swipe_left")
-    assert client.subscribe("status").line()["state"] == "degraded"
-    assert str(broken) in daemon.stderr()
-
-
 def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path, tmp_path: Path) -> None:
     def explained(*flags: str) -> str:
         return explain(*settings_of("--model", model, *flags))
