@@ -133,8 +133,7 @@ def test_some_rung_answers_whenever_one_can(story: list[tuple[list[bool], float]
 def test_fallback_is_opened_only_when_it_is_needed(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr(
-        "gestured.model.rung.open_model",
-        lambda source, *more: opened.append(str(source)) or open_model(source, *more),
+        "gestured.model.rung.open_model", lambda source, *more: opened.append(str(source)) or open_model(source, *more)
     )
     ladder = ladder_for("cnn_lstm")
     ladder.classify(segment())

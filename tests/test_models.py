@@ -122,11 +122,7 @@ def test_opening_writes_nothing_prints_nothing_and_loads_no_lab(tmp_path: Path) 
     )
     environment = {"HOME": str(home), "PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
-        [sys.executable, "-c", script, good, bad],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", script, good, bad], env=environment, capture_output=True, text=True, check=False
     )
     assert (done.stdout, done.stderr.strip()) == ("", "")
     assert list(home.rglob("*")) == []

@@ -20,17 +20,7 @@ from tests.programs import PARSERS, subcommands
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-EXTRAS = (
-    "torch",
-    "sklearn",
-    "onnx",
-    "pytest",
-    "hypothesis",
-    "hatchling",
-    "paho",
-    "zenoh",
-    "serial",
-)
+EXTRAS = ("torch", "sklearn", "onnx", "pytest", "hypothesis", "hatchling", "paho", "zenoh", "serial")
 ALL_BUT_LAB = """
 import importlib, pkgutil, gestured
 found = pkgutil.walk_packages(gestured.__path__, "gestured.")

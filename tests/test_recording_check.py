@@ -27,20 +27,12 @@ def changed(name: str, index: Any, value: object) -> np.ndarray:
     [
         ("frames", np.zeros((10, 6), np.uint8), "expected the shape (N, R, C)"),
         ("frames", np.zeros((9, 2, 3), np.uint8), "expected the shape (9,), found (10,)"),
-        (
-            "frames",
-            np.zeros((10, 1, 9), np.uint8),
-            "R and C from 2 to 64, found (10, 1, 9)",
-        ),
+        ("frames", np.zeros((10, 1, 9), np.uint8), "R and C from 2 to 64, found (10, 1, 9)"),
         ("frames", np.zeros((10, 2, 65), np.uint8), "R and C from 2 to 64"),
         ("frames", np.full((10, 2, 3), 1e39), "recording 0: expected values that a float32 holds"),
         ("frames", np.zeros((10, 2, 3), complex), "complex128"),
         ("frames", np.full((10, 2, 3), np.nan), "recording 0: expected finite"),
-        (
-            "frames",
-            np.where(np.arange(10)[:, None, None] == 6, np.inf, np.zeros((10, 2, 3))),
-            "recording 1: expected",
-        ),
+        ("frames", np.where(np.arange(10)[:, None, None] == 6, np.inf, np.zeros((10, 2, 3))), "recording 1: expected"),
         ("times", np.zeros(9), "(10,)"),
         ("times", np.arange(10), "expected float64, found int64"),
         ("times", changed("times", 5, 0.0), "recording 1: expected strictly increasing"),

@@ -256,13 +256,7 @@ def test_bad_taxels_never_change() -> None:
 
 def test_a_clipped_sensor_without_noise_is_silent_in_idle() -> None:
     sensor = replace(
-        SimulatedSensor.nominal(),
-        clipped=True,
-        noise=0.0,
-        row_noise=0.0,
-        column_noise=0.0,
-        common_noise=0.0,
-        drift=0.0,
+        SimulatedSensor.nominal(), clipped=True, noise=0.0, row_noise=0.0, column_noise=0.0, common_noise=0.0, drift=0.0
     )
     take = gesture_take("one_tap", Participant(0), sensor, generator(2))
     assert not take.frames[still(take)].any()

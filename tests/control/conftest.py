@@ -55,11 +55,7 @@ def start() -> Iterator[Start]:
 
     def begin(*arguments: object, **more: Any) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", "gestured.control", *map(str, arguments)]
-        options: dict[str, Any] = {
-            "stdout": subprocess.PIPE,
-            "stderr": subprocess.PIPE,
-            "stdin": subprocess.DEVNULL,
-        }
+        options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
         more["env"] = os.environ | {"PYTHONUNBUFFERED": "1"} | more.get("env", {})
         process = subprocess.Popen(command, **options | more)
         running.append(process)

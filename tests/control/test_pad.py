@@ -240,9 +240,7 @@ def test_a_pad_that_nobody_touches_ends() -> None:
         assert touch(page, number, FINGER)[0] == 403 and page.ask("/open", "POST", {})[0] == 403
 
 
-def test_the_page_is_told_why_frames_are_not_heard_for_as_long_as_they_are_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_page_is_told_why_frames_are_not_heard_for_as_long_as_they_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gestured.client.pad.pad.AGAIN_S", 0.05)
     with served() as (_, page):
         stream, _ = seat(page.come_in())

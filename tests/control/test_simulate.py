@@ -52,11 +52,7 @@ def test_a_bundle_of_pressure_and_trajectory(run, udp, monkeypatch):
     frames = np.array([message.params[1:] for message in pressures])
     assert frames.shape == (FRAMES, 81)
     (performed,) = map(json.loads, out.splitlines())
-    assert (performed["type"], performed["sensor"], performed["gesture"]) == (
-        "performed",
-        "seat-2",
-        "one_tap",
-    )
+    assert (performed["type"], performed["sensor"], performed["gesture"]) == ("performed", "seat-2", "one_tap")
     # The strongest frame lies within what was performed, by the bundles' own time tags.
     moments = np.array([bundle.timestamp for bundle in bundles])
     strongest = moments[np.ptp(frames - frames[0], axis=1).argmax()]

@@ -31,9 +31,7 @@ waiting = st.tuples(
     st.floats(0, 12) | st.just(P),
     st.lists(
         st.builds(
-            felt,
-            st.none() | st.integers(-5, 40) | st.integers(-(2**31), 2**31 - 1),
-            st.none() | st.floats(0, 60),
+            felt, st.none() | st.integers(-5, 40) | st.integers(-(2**31), 2**31 - 1), st.none() | st.floats(0, 60)
         ),
         min_size=1,
         max_size=6,

@@ -66,10 +66,7 @@ def test_a_zone_is_asked_for_where_something_has_a_place() -> None:
         (request(gestures=["swipe_up", "zigzag"]), '"zigzag", expected any of swipe_up, circle'),
         (request(zones=["volum"]), '"volum", expected any of volume'),
         (request(sensors=["a b"]), '"a b" cannot be a sensor'),
-        (
-            b'{"subscribe":{"types":' + b"[" * 300 + b"]" * 300 + b"}}",
-            "subscribe.types: expected a list of strings",
-        ),
+        (b'{"subscribe":{"types":' + b"[" * 300 + b"]" * 300 + b"}}", "subscribe.types: expected a list of strings"),
     ],
 )
 def test_requests_that_are_none_are_answered_with_what_was_expected(line: bytes, says: str) -> None:

@@ -13,10 +13,7 @@ from tests.swipes import RATE_HZ, swipes
 
 
 @given(
-    st.sampled_from([IDLE, CONTACT, RELEASING, GAP, SPENT]),
-    st.floats(0, 1000),
-    st.floats(-1, 9),
-    st.floats(0, 1000),
+    st.sampled_from([IDLE, CONTACT, RELEASING, GAP, SPENT]), st.floats(0, 1000), st.floats(-1, 9), st.floats(0, 1000)
 )
 def test_the_thresholds_that_are_shown_are_those_that_decide(phase, peak: float, past: float, activity: float) -> None:
     segmenter = Segmenter(81, 1.0)

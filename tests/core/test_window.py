@@ -93,14 +93,7 @@ def test_a_segment_of_noise_is_not_blown_up(noise: float, floor: float) -> None:
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 @pytest.mark.parametrize(
-    ("grid", "value"),
-    [
-        ((9, 9), 0.0),
-        ((9, 9), -5.0),
-        ((12, 12), -5.0),
-        ((18, 9), 0.0),
-        ((18, 9), -5.0),
-    ],
+    ("grid", "value"), [((9, 9), 0.0), ((9, 9), -5.0), ((12, 12), -5.0), ((18, 9), 0.0), ((18, 9), -5.0)]
 )
 def test_a_segment_without_any_pressure_is_dark(grid: Shape, value: float, noise: float) -> None:
     window = TEXYZ.apply(whole(np.full((3, *grid), value), np.arange(3) / 15, noise=noise))
@@ -169,15 +162,7 @@ def test_the_whole_movement_is_seen_wherever_it_was(short: int, long: int, tall:
     assert found == pytest.approx(found[0], rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("grid", "column"),
-    [
-        ((30, 10), 0),
-        ((30, 10), 9),
-        ((8, 4), 0),
-        ((8, 4), 3),
-    ],
-)
+@pytest.mark.parametrize(("grid", "column"), [((30, 10), 0), ((30, 10), 9), ((8, 4), 0), ((8, 4), 3)])
 def test_nothing_is_pressed_beside_the_sensor(grid: Shape, column: int) -> None:
     """A swipe along the edge of a long sensor is no broader than one in its middle."""
     rows, columns = grid

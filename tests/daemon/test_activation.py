@@ -102,10 +102,7 @@ def test_what_is_sent_while_it_is_stopped_is_the_next_starts(model: Path, tmp_pa
         ({"osc": "metrics"}, ("'osc'", "ListenDatagram", "SOCK_STREAM")),
         ({"events": "osc"}, ("'events'", "ListenStream", "SOCK_DGRAM")),
         ({"control": "control", "osc": "file"}, ("'osc'", "no socket")),
-        (
-            {"gestured.socket": "osc"},
-            ("'gestured.socket'", "FileDescriptorName=", ", control, gates, metrics"),
-        ),
+        ({"gestured.socket": "osc"}, ("'gestured.socket'", "FileDescriptorName=", ", control, gates, metrics")),
     ],
 )
 def test_a_socket_that_is_something_else_is_refused(model: Path, tmp_path: Path, passed, names, said) -> None:

@@ -39,12 +39,7 @@ def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tm
     path.write_text('model = "file"\nstale_s = 3\nmax_sensors = 7\npublish = ["osc://a:1"]\n')
     env = {"GESTURED_MODEL": "env", "GESTURED_STALE_S": "4", "GESTURED_CONFIG": str(path), "OTHER": "x"}
     settings, sources = load_settings({"model": "flag"}, env)
-    assert (settings.model, settings.stale_s, settings.max_sensors, settings.clock) == (
-        "flag",
-        4.0,
-        7,
-        "arrival",
-    )
+    assert (settings.model, settings.stale_s, settings.max_sensors, settings.clock) == ("flag", 4.0, 7, "arrival")
     assert sources == {
         "model": "command line",
         "stale_s": "environment",

@@ -53,10 +53,7 @@ def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(s
     sensor.perform("left", "tap")  # without two quiet seconds: the baseline is still known
     told, *lines = [client.line() for _ in range(3)]
     assert told == {"type": "gestures", "gestures": ["knock", *tiny_model.GESTURES[1:]]}
-    assert [(e["type"], e.get("gesture"), e["id"]) for e in lines] == [
-        ("unknown", None, 2),
-        ("gesture", "knock", 3),
-    ]
+    assert [(e["type"], e.get("gesture"), e["id"]) for e in lines] == [("unknown", None, 2), ("gesture", "knock", 3)]
     assert lines[1]["sequence"] == 2
     assert daemon.client().hello["gestures"][0] == "knock"
     assert daemon.client().hello["instance"] == client.hello["instance"]

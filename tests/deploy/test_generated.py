@@ -22,10 +22,7 @@ OURS = {"gestures.one_tap": "per_gesture", "gates.start": "gate"}  # keys in the
 
 @pytest.mark.parametrize(
     ("kept", "made"),
-    [
-        ("deploy/gestured.toml", configuration.example),
-        ("deploy/grafana/dashboards/gestured.json", dashboard.dashboard),
-    ],
+    [("deploy/gestured.toml", configuration.example), ("deploy/grafana/dashboards/gestured.json", dashboard.dashboard)],
 )
 def test_what_is_kept_is_what_is_made(kept: str, made):
     what = made.__module__.rsplit(".", 1)[-1]

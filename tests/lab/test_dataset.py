@@ -33,15 +33,7 @@ from gestured.lab.dataset import (
 )
 from gestured.lab.samples import WINDOW, Sample, Samples, collect, join
 from gestured.record.recordings import Recordings
-from gestured.simulator import (
-    GESTURES,
-    Participant,
-    SimulatedSensor,
-    Take,
-    generator,
-    gesture_take,
-    session,
-)
+from gestured.simulator import GESTURES, Participant, SimulatedSensor, Take, generator, gesture_take, session
 from tests.core.test_sensor import Fake
 
 

@@ -144,10 +144,7 @@ def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("gestures", ("one_tap", "swipe_up")), ("training_data", "unknown")],
-)
+@pytest.mark.parametrize(("key", "value"), [("gestures", ("one_tap", "swipe_up")), ("training_data", "unknown")])
 def test_metadata_that_would_be_refused_is_not_written(key: str, value: Any, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="not written"):
         export_net(Net(), tmp_path / "wrong.onnx", Facts(**{**CARD, key: value}))

@@ -83,10 +83,7 @@ def test_what_nobody_meant_on_this_sensor_is_no_gesture_any_more(run: Run, tmp_p
     ],
 )
 def test_what_no_silence_can_be_learned_from_is_one_sentence(
-    arguments: tuple[str, ...],
-    reason: str,
-    run: Run,
-    tmp_path: Path,
+    arguments: tuple[str, ...], reason: str, run: Run, tmp_path: Path
 ) -> None:
     write(tmp_path / "a.npz", cut_gestures(("07",), GESTURES, repeats=3))
     tape(tmp_path / "day.mcap", ["one_tap"] * 24)

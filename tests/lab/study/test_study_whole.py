@@ -17,18 +17,7 @@ from gestured.lab.study.methods import METHODS
 from gestured.lab.study.tables import Plan
 from gestured.record.arrays import write
 
-SECTIONS = (
-    "about",
-    "machine",
-    "data",
-    "methods",
-    "cells",
-    "trials",
-    "copies",
-    "choices",
-    "run_time",
-    "online",
-)
+SECTIONS = ("about", "machine", "data", "methods", "cells", "trials", "copies", "choices", "run_time", "online")
 LEFT = ("tp_rf", "lstm", "cnn_lstm")  # those that ship
 
 
