@@ -8,6 +8,7 @@ import signal
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from gestured.model.shipped import LADDER
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.trust import trust
+from tests.several import several
 from tests.small_model import GESTURES, build
 from tests.sockets import PATIENCE_S, FakeDaemon
 
@@ -92,18 +94,14 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def serve(model: Path, tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
     """Starts daemons with these flags, each in a folder of its own; they end with the test, and end well."""
-    daemons: list[Daemon] = []
+    numbers = count()
 
     def begin(*flags: object, model: object = model) -> Daemon:
-        folder = tmp_path / f"daemon{len(daemons)}"
+        folder = tmp_path / f"daemon{next(numbers)}"
         folder.mkdir()
-        daemons.append(Daemon.start(folder, model, *flags))
-        return daemons[-1]
+        return Daemon.start(folder, model, *flags)
 
-    yield begin
-    for daemon in daemons:
-        assert daemon.stop() == 0, daemon.stderr()
-        assert "Traceback" not in daemon.stderr()
+    yield from several(begin, Daemon.ends_well)
 
 
 @pytest.fixture

@@ -11,6 +11,8 @@ import sys
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ import pytest
 from gestured.bridge.cli import main
 from gestured.client.control import Control
 from tests.daemon.harness import DEADLINE_S, Daemon, running
+from tests.several import several
 from tests.sockets import free_address
 
 
@@ -84,16 +87,13 @@ def page(address: str) -> str:
 @pytest.fixture
 def bridge(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     """Starts bridges; whatever still runs at the end of the test is ended."""
-    running: list[Process] = []
+    numbers = count()
 
-    def begin(*arguments: object, **more: Any) -> Process:
-        running.append(Process(tmp_path, len(running), *arguments, **more))
-        return running[-1]
-
-    yield begin
-    for process in running:
+    def ended(process: Process) -> None:
         process.stop()
         assert "Traceback" not in process.said()
+
+    yield from several(lambda *flags, **more: Process(tmp_path, next(numbers), *flags, **more), ended)
 
 
 @pytest.fixture
@@ -183,15 +183,7 @@ class Broker:
 @pytest.fixture
 def broker(tmp_path: Path) -> Iterator[Callable[..., Broker]]:
     """Starts brokers with these lines of configuration."""
-    running: list[Broker] = []
-
-    def begin(*lines: str) -> Broker:
-        running.append(Broker(tmp_path, *lines))
-        return running[-1]
-
-    yield begin
-    for each in running:
-        each.kill()
+    yield from several(partial(Broker, tmp_path), Broker.kill)
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from gestured.bridge.retained import Retained
 from gestured.client.subscriber import Subscriber
 from tests.bridge.conftest import Broker, Process, emit, guarded, page, wait
 from tests.daemon.harness import DEADLINE_S, Daemon
+from tests.several import several
 from tests.sockets import HELLO, FakeDaemon
 
 paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
@@ -85,15 +86,7 @@ class Listener:
 
 @pytest.fixture
 def listen() -> Iterator[Callable[..., Listener]]:
-    opened: list[Listener] = []
-
-    def begin(port: int, *topics: str) -> Listener:
-        opened.append(Listener(port, *topics))
-        return opened[-1]
-
-    yield begin
-    for listener in opened:
-        listener.close()
+    yield from several(Listener, Listener.close)
 
 
 def begin(bridge: Callable[..., Process], broker: Broker, daemon: Any, *more: object, **options: Any) -> Process:

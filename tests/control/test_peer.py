@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.several import several
 from tests.sockets import HELLO
 
 OTHER, OPERATOR = 65_533, 65_532  # two accounts that nobody has
@@ -50,18 +51,18 @@ Serve = Callable[[Path, str], "subprocess.Popen[str]"]
 @pytest.fixture
 def serve() -> Iterator[Serve]:
     """Starts a server of the account OTHER at a path, with the line that it says."""
-    running: list[subprocess.Popen[str]] = []
 
     def begin(path: Path, line: str) -> "subprocess.Popen[str]":
         command = [sys.executable, "-c", SERVER, str(path), str(OTHER), line]
-        running.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
-        assert running[-1].stdout is not None and running[-1].stdout.readline() == "ready\n"
-        return running[-1]
+        server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert server.stdout is not None and server.stdout.readline() == "ready\n"
+        return server
 
-    yield begin
-    for process in running:
-        process.kill()
-        process.communicate()
+    def ended(server: "subprocess.Popen[str]") -> None:
+        server.kill()
+        server.communicate()
+
+    yield from several(begin, ended)
 
 
 def folder(below: str) -> Iterator[Path]:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.daemon.harness import Daemon, running
+from tests.several import several
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -33,15 +34,11 @@ def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Da
 @pytest.fixture
 def start(model: Path, tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
     """Starts daemons that end with the test."""
-    daemons: list[Daemon] = []
 
-    def start(*flags: object, model: object = model, **more: Any) -> Daemon:
-        daemons.append(Daemon.start(tmp_path, model, *flags, **more))
-        return daemons[-1]
+    def begin(*flags: object, model: object = model, **more: Any) -> Daemon:
+        return Daemon.start(tmp_path, model, *flags, **more)
 
-    yield start
-    for daemon in daemons:
-        daemon.stop()
+    yield from several(begin, Daemon.stop)
 
 
 @pytest.fixture

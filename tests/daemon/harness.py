@@ -204,14 +204,18 @@ class Daemon:
             assert self.process.stdout is not None
             self.process.stdout.close()
 
+    def ends_well(self) -> None:
+        """End it, which must leave no failure and no traceback."""
+        assert self.stop() == 0, self.stderr()
+        assert "Traceback" not in self.stderr()
+
 
 @contextmanager
 def running(folder: Path, model: object, *flags: object, **more: Any) -> Iterator[Daemon]:
     """A daemon with the sensor's clock, which ends well."""
     daemon = Daemon.start(folder, model, "--clock", "sensor", *flags, **more)
     yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    daemon.ends_well()
 
 
 class Hand:

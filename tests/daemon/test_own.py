@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import Model
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of, running
+from tests.several import several
 from tests.small_model import WINDOW, segment
 
 Point = tuple[float, float]
@@ -57,17 +59,9 @@ def daemon(lasting: Daemon) -> Iterator[Daemon]:
 @pytest.fixture
 def begin(tmp_path: Path, model: Path) -> Iterator[Begin]:
     """Starts daemons with a file for own gestures; no sensor falls silent soon."""
-    daemons: list[Daemon] = []
-
-    def start(*flags: object, **more: Any) -> Daemon:
-        more = {"env": {"STATE_DIRECTORY": str(tmp_path)}} | more
-        daemons.append(Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, *flags, **more))
-        return daemons[-1]
-
-    yield start
-    for daemon in daemons:
-        assert daemon.stop() == 0, daemon.stderr()
-        assert "Traceback" not in daemon.stderr()
+    state = {"STATE_DIRECTORY": str(tmp_path)}
+    start = partial(Daemon.start, tmp_path, model, "--clock", "sensor", "--stale-s", 30, env=state)
+    yield from several(start, Daemon.ends_well)
 
 
 def stroke(hand: Hand, start: Point, end: Point, frames: int = 7) -> list[Frame]:

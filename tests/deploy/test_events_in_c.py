@@ -6,6 +6,7 @@ import math
 import random
 import subprocess
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 from gestured.client.control import Control
 from tests.deploy.compilers import CPP, HERE, POSIX, C, compiled
+from tests.several import several
 from tests.sockets import GESTURE, HELLO, FakeDaemon
 
 SOURCE = HERE / "events.c"
@@ -48,6 +50,10 @@ class Program:
         assert self.process.wait() == 1, "a sanitizer has ended it"
         return said.removeprefix("refused: ").rstrip("\n")
 
+    def end(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -57,16 +63,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def run(program: Path) -> Iterator[Callable[..., Program]]:
-    running: list[Program] = []
-
-    def begin(*arguments: object) -> Program:
-        running.append(Program(program, *arguments))
-        return running[-1]
-
-    yield begin
-    for each in running:
-        each.process.kill()
-        each.process.communicate()
+    yield from several(partial(Program, program), Program.end)
 
 
 def test_an_event_comes_whole_however_its_line_is_cut(run, fake: FakeDaemon):
