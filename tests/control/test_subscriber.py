@@ -17,8 +17,6 @@ from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable, read_ahead
 from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
-from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon
 from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon, meanwhile
 
 
@@ -248,21 +246,3 @@ def test_attempts_come_ever_more_rarely_but_within_bounds(tmp_path: Path, monkey
     waits = [round(wait, 6) for wait in waits if wait > 1e-9]
     assert len(waits) >= 19 and waits == sorted(waits)
     assert waits[-1] == pytest.approx(LONGEST_S)
-
-
-@pytest.mark.e2e
-def test_a_real_daemon_that_is_started_again(tmp_path: Path):
-    model = tiny_model.make(tmp_path / "tiny.onnx")
-    instances = []
-    with Subscriber(tmp_path / "events.sock", types=["gesture", "status"]) as subscriber:
-        for _ in range(2):
-            daemon = Daemon.start(tmp_path, model)
-            try:
-                assert next(subscriber)["type"] == "status"
-                daemon.ask("emit", gesture="swipe_left", sensor="armrest")
-                gesture = next(event for event in subscriber if event["type"] == "gesture")
-                assert (gesture["gesture"], gesture["sequence"]) == ("swipe_left", 1)
-                instances.append(subscriber.hello["instance"])
-            finally:
-                daemon.stop()
-    assert len(set(instances)) == 2

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from pythonosc.udp_client import SimpleUDPClient
 
 from tests.daemon.harness import Client, Daemon, Frame, Hand
 
@@ -28,13 +27,6 @@ def stream(client: Client, send: Callable[[Frame], None], sensor: str) -> dict[s
             if line["sensors"].get(sensor) == "ok" and swipe is None:
                 swipe = [hand.frame(4.0, 1 + i / 4) for i in range(25)]
         send(swipe.pop(0) if swipe else hand.frame())
-
-
-def test_python_osc(start) -> None:
-    daemon: Daemon = start()
-    sender = SimpleUDPClient(*daemon.address)
-    event = stream(daemon.client(), lambda frame: sender.send_message("/arm/pressure", frame.ravel().tolist()), "arm")
-    assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
 
 
 def test_oscsend(start) -> None:

@@ -8,23 +8,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-import numpy as np
 import pytest
 
 import gestured
 from gestured.core.events import Event
-from gestured.core.facts import events_of
-from gestured.core.frames import Frame
 from gestured.core.messages import event_type
-from gestured.core.scene import Scene
 from gestured.daemon import operations
 from gestured.daemon.asked import scene_of
 from gestured.daemon.merge import load_settings
 from gestured.daemon.parts import Parts
 from gestured.model.ladder import ladder_for
-from gestured.model.opening import open_model
 from gestured.record.replay import maker
-from tests.daemon import harness
+from tests.daemon import harness, tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor
 
 KINDS = ("gesture", "unknown", "cancelled", "onset", "release")
@@ -52,21 +47,9 @@ def session(seed: int) -> list[tuple[float, harness.Frame]]:
     return timed
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_online_is_offline(shared: Daemon, model: Path, seed: int) -> None:
-    name, timed = f"session{seed}", session(seed)
-    opened = open_model(model)
-    sensor = gestured.Sensor(name, Scene(opened.gestures, (9, 9)), opened)
-    offline: list[Event] = []
-    for t, frame in timed:
-        offline += events_of(sensor.push(Frame(t, frame.astype(np.float32))))
-    assert len(offline) > 50 and {"gesture", "cancelled"} < {event_type(event) for event in offline}
-    same(said(shared, name, timed, len(offline)), offline)
-
-
-def test_a_process_of_ones_own_hears_the_same(start: Callable[..., Daemon], model: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("used", [["one_tap", "swipe_left", "swipe_up"], list(tiny_model.GESTURES)])
+def test_online_is_offline(start: Callable[..., Daemon], model: Path, tmp_path: Path, used: list[str]) -> None:
     """gestured.open with what the daemon's settings say; a hand stays on the sensor when it falls silent."""
-    used = ["one_tap", "swipe_left", "swipe_up"]
     settings = tmp_path / "gestured.toml"
     settings.write_text(f"gestures.use = {used}\n[sensors.turned]\nrotate = 90\nmirror = true\n")
     timed = session(4)
@@ -77,7 +60,8 @@ def test_a_process_of_ones_own_hears_the_same(start: Callable[..., Daemon], mode
         own += recognizer.push(t, frame.tolist())
     own += recognizer.flush(timed[-1][0] + 60.0)
     last = [event_type(event) for event in own[-3:]]
-    assert last == ["onset", "cancelled", "release"] and {"gesture", "unknown"} < {event_type(event) for event in own}
+    assert last == ["onset", "cancelled", "release"] and len(own) > 50
+    assert {event_type(event) for event in own} >= {"gesture", "cancelled"}
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", "--config", settings)
     same(said(daemon, "turned", timed, len(own)), own)
 

@@ -16,7 +16,7 @@ from gestured.core.errors import SettingsError
 from gestured.daemon.bound import bind_all
 from gestured.daemon.explain import explain
 from gestured.daemon.sockets import AddressError, UnixListener
-from tests.daemon.harness import DEADLINE_S, Client, Daemon, Sensor, lines_of
+from tests.daemon.harness import DEADLINE_S, Client, Daemon, lines_of
 from tests.daemon.parts import settings_of
 
 
@@ -83,16 +83,6 @@ def test_an_address_that_is_taken_and_by_whom(tmp_path: Path, key: str, to: str)
         with pytest.raises(AddressError, match=f"{key}: .*{address}.* in use: sudo ss"):
             bound("--socket", tmp_path / "s", f"--{key}", address)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_second_daemon_leaves_the_first_one_alone(start, model: Path) -> None:
-    first = start("--clock", "sensor")
-    client = first.client()
-    said = refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", first.socket)
-    assert str(first.socket) in said and "another" in said
-    Sensor(first, "arm").begin().perform("left")
-    assert client.events("gesture", "arm")
-    assert first.client().hello["instance"] == client.hello["instance"]
 
 
 def test_a_stale_socket_is_taken_over_and_anything_else_is_not(tmp_path: Path) -> None:

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.client.control import Control
 from tests.deploy.compilers import CPP, HERE, POSIX, C, compiled
 from tests.several import several
 from tests.sockets import GESTURE, HELLO, FakeDaemon
@@ -186,14 +185,3 @@ def test_a_text_and_a_number_are_what_json_says(
     assert parser.number(line(key=number), ctypes.byref(value)) == 1
     assert math.isclose(value.value, number, rel_tol=2e-16 if 1 < abs(number) < 1e15 else 1e-13, abs_tol=1e-300)
     assert parser.number(line(key=str(number)), ctypes.byref(value)) == 0
-
-
-def test_a_real_daemons_event(run, serve):
-    daemon = serve("--grid", "9x9")
-    subscriber = run(daemon.socket, ALL)
-    assert subscriber.line()[0] == "status"
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("emit", gesture="swipe_left", sensor="armrest")
-    while (line := subscriber.line())[0] != "gesture":
-        pass
-    assert line[1:3] == ["armrest", "swipe_left"] and line[10] == "1"  # marked as a test
