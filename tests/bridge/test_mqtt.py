@@ -89,6 +89,12 @@ def listen() -> Iterator[Callable[..., Listener]]:
     yield from several(Listener, Listener.close)
 
 
+@pytest.fixture
+def at(broker: Callable[..., Broker]) -> Broker:
+    """One that lets everybody in."""
+    return broker()
+
+
 def begin(bridge: Callable[..., Process], broker: Broker, daemon: Any, *more: object, **options: Any) -> Process:
     """A bridge of the machine `car`."""
     path = daemon.path if isinstance(daemon, FakeDaemon) else daemon.socket
@@ -116,8 +122,7 @@ def retained(listen: Callable[..., Listener], broker: Broker, topics: str = "#")
     return found
 
 
-def test_a_real_daemons_events_arrive_and_none_is_retained(bridge, broker, listen, daemon: Daemon):
-    at = broker()
+def test_a_real_daemons_events_arrive_and_none_is_retained(bridge, at, listen, daemon: Daemon):
     listener = listen(at.port, "gestured/#")
     assert begin(bridge, at, daemon).ready() | {"metrics": None} == {
         "type": "ready", "bridge": "mqtt", "broker": at.address, "host": "car", "metrics": None,
@@ -136,8 +141,7 @@ def test_a_real_daemons_events_arrive_and_none_is_retained(bridge, broker, liste
     assert not [topic for topic in found if topic.endswith("/gesture")]
 
 
-def test_sensors_states_are_retained_and_follow_the_daemon(bridge, broker, listen, fake: FakeDaemon):
-    at = broker()
+def test_sensors_states_are_retained_and_follow_the_daemon(bridge, at, listen, fake: FakeDaemon):
     listener = listen(at.port, "gestured/car/#")
     started(bridge, at, fake)
     listener.until("gestured/car/armrest/state", "no_data")
@@ -158,8 +162,7 @@ def test_sensors_states_are_retained_and_follow_the_daemon(bridge, broker, liste
     }
 
 
-def test_what_is_asked_for_is_asked_of_the_daemon_and_unknown_keys_are_passed_on(bridge, broker, listen, fake):
-    at = broker()
+def test_what_is_asked_for_is_asked_of_the_daemon_and_unknown_keys_are_passed_on(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/#")
     process = begin(
         bridge, at, fake, "--types", "gesture,unknown,touch", "--sensors", "armrest", "--gestures", "one_tap,double_tap"
@@ -181,8 +184,7 @@ def test_what_is_asked_for_is_asked_of_the_daemon_and_unknown_keys_are_passed_on
     assert not [topic for topic in retained(listen, at, "gestured/#") if topic.endswith(("/touch", "/gesture"))]
 
 
-def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_killed(bridge, broker, listen, fake):
-    at = broker()
+def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_killed(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/car/availability")
     process = started(bridge, at, fake)
     listener.until("gestured/car/availability", "online")
@@ -199,8 +201,7 @@ def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_k
     listener.until("gestured/car/availability", "offline")
 
 
-def test_a_killed_bridges_last_will_does_not_outlive_its_successor(bridge, broker, listen, fake):
-    at = broker()
+def test_a_killed_bridges_last_will_does_not_outlive_its_successor(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/car/availability")
     first = started(bridge, at, fake)
     listener.until("gestured/car/availability", "online")
@@ -248,8 +249,7 @@ KEYS = {  # component -> required, allowed
 }  # fmt: skip
 
 
-def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake):
-    at = broker()
+def test_discovery_holds_what_home_assistant_takes(bridge, at, listen, fake):
     listener = listen(at.port, "homeassistant/#")
     begin(bridge, at, fake)
     any_name = "wave/#+ é"  # a model of one's own may call its gestures anything, a topic may not
@@ -339,9 +339,8 @@ def test_a_gate_that_opens_by_itself_is_not_published_anew_each_second():
     assert not list(retained.changes())
 
 
-def test_what_others_retain_is_neither_read_nor_cleared(bridge, broker, listen, fake):
+def test_what_others_retain_is_neither_read_nor_cleared(bridge, at, listen, fake):
     """Any integration may write below the discovery prefix, and as much as it likes."""
-    at = broker()
     theirs = "homeassistant/event/gestured_car/other/config"
     stranger = listen(at.port, theirs)
     stranger.client.publish(theirs, b"{}" * 500_000, qos=1, retain=True)
@@ -356,8 +355,7 @@ def test_what_others_retain_is_neither_read_nor_cleared(bridge, broker, listen, 
     assert "Received SUBSCRIBE from gestured-car" not in said
 
 
-def test_a_bridge_goes_on_where_nobody_reads_that_it_is_ready(bridge, broker, listen, fake):
-    at = broker()
+def test_a_bridge_goes_on_where_nobody_reads_that_it_is_ready(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/#")
     process = begin(bridge, at, fake)
     process.process.stdout.close()
@@ -469,8 +467,7 @@ def test_sequences_go_on_where_there_are_as_many_sensors_as_are_remembered(monke
     assert daemon.hello["sensors"] == {"armrest": 7, "door": 1}
 
 
-def test_a_sensor_that_a_restarted_daemon_does_not_know_is_silent(bridge, broker, listen, fake):
-    at = broker()
+def test_a_sensor_that_a_restarted_daemon_does_not_know_is_silent(bridge, at, listen, fake):
     started(bridge, at, fake)
     listener = listen(at.port, "gestured/car/armrest/state")
     fake.say(STATUS)
@@ -481,8 +478,7 @@ def test_a_sensor_that_a_restarted_daemon_does_not_know_is_silent(bridge, broker
     listener.until("gestured/car/armrest/state", "no_data")
 
 
-def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
-    at = broker()
+def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, at, listen, fake):
     process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
     fake.accept()
     where = process.ready()["metrics"]
@@ -502,8 +498,7 @@ def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broke
     assert retained(listen, at)["gestured/car/availability"] == "online"
 
 
-def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
-    at = broker()
+def test_a_daemon_that_starts_again_is_found(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/car/armrest/gesture")
     started(bridge, at, fake)
     fake.say(gesture(1, decided=gesture(1)["decided"] + 30))  # by its sensor's clock, which has run ahead for weeks
@@ -670,16 +665,14 @@ def test_a_broker_that_takes_small_packets_alone_is_none_for_the_bridge(bridge, 
     assert "is not there" not in process.said()
 
 
-def test_two_bridges_of_one_name_are_told_that_there_is_another(bridge, broker, fake):
+def test_two_bridges_of_one_name_are_told_that_there_is_another(bridge, at, fake):
     """A broker need not say why it closes the older connection: mosquitto 2.0 does not."""
-    at = broker()
     first, second = begin(bridge, at, fake), begin(bridge, at, fake)
     for process in (first, second):
         process.until("does another bridge have the name gestured-car? (--host)")
 
 
-def test_lines_of_a_mad_daemon_are_passed_over(bridge, broker, listen, fake):
-    at = broker()
+def test_lines_of_a_mad_daemon_are_passed_over(bridge, at, listen, fake):
     listener = listen(at.port, "gestured/#")
     process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
     fake.accept()

@@ -97,22 +97,6 @@ def known(daemon: Daemon, arm: Sensor) -> Client:
     return client
 
 
-def test_what_the_bus_closes_stays_closed_when_the_bridge_is_killed(bridge, at, gated, arm, house) -> None:
-    client = known(gated, arm)
-    process, _ = start(bridge, at, gated)
-    say(house, OFF)
-    assert client.line()["closed"] == ["mqtt"]
-    process.process.kill()
-    process.process.wait()
-    arm.perform("left", "up")
-    assert [client.line()["gates"] for _ in range(2)] == [["mqtt"], ["mqtt"]]
-    with Control(Path(gated.ready["control"])) as operator:
-        assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["mqtt"]
-        operator.ask("allow", gate="mqtt")
-    arm.perform("down")
-    assert [client.line().get(key) for key in ("closed", "gesture")] == [[], "swipe_down"]  # nothing in between
-
-
 def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, arm, house) -> None:
     client = known(gated, arm)
     start(bridge, at, gated, "--gate", "house")

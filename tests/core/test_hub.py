@@ -24,6 +24,7 @@ from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
 from gestured.core.points import Certainty
 from gestured.core.scene import Scene, Setup
+from gestured.core.wire import Addresses
 from gestured.lab.recordings.live import LiveSensor
 from gestured.record import tape_writer
 from tests import encoding
@@ -335,6 +336,14 @@ def test_a_sensor_that_cannot_hear_says_what_it_waits_for() -> None:
         fine,  # what goes on for so long is learned
     ]
     assert send(hand.idle(1.0))[-1] == fine
+
+
+def test_other_firmware_has_other_addresses() -> None:
+    hub = Hub(replace(SCENE, addresses=Addresses("/textile/{sensor}/matrix", "/textile/{sensor}/touches")), Sure())
+    packets = [(floats(f"/{name}", Hand().frame(), 0), FIRST) for name in ("textile/long/matrix", "arm/pressure")]
+    facts = hub.receive(packets, 1.0)
+    assert list(hub.readings(1.0)) == ["long"]
+    assert [fact.reason for fact in facts if isinstance(fact, Dropped)] == ["address"]
 
 
 def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:

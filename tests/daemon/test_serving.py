@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from pythonosc.osc_message import OscMessage
 
@@ -48,31 +47,6 @@ def test_status_comes_by_itself_and_names_each_sensor(shared: Daemon) -> None:
     assert "starting" in seen and line["state"] == "ok"
     assert line["model"] == "tiny" and abs(line["time"] - time.time()) < 5
     client.until(lambda line: line["sensors"]["living"] == "stale")
-
-
-def test_other_firmware_has_other_addresses_and_another_grid(start, tmp_path: Path) -> None:
-    config = tmp_path / "gestured.toml"
-    config.write_text(
-        "[sensors.long]\ngrid = '18x9'\nrotate = 180\n"
-        "[addresses]\npressure = '/textile/{sensor}/matrix'\ntrajectory = '/textile/{sensor}/touches'\n"
-        "[gestures.swipe_up]\nrefractory_s = 10\n"
-    )
-    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
-    client = daemon.client().subscribe("gesture", "cancelled")
-
-    def encode(address: str, frame: harness.Frame, count: int) -> bytes:
-        tall = np.concatenate([frame[::-1], np.full((9, 9), 20.0)])  # its lower half rests
-        return harness.floats("/textile/long/matrix", tall, count)
-
-    sensor = Sensor(daemon, "long", encode).begin().perform("up", "up")
-    lines = [client.line() for _ in range(2)]
-    assert [(e["sensor"], e["type"], e.get("gesture", e.get("reason"))) for e in lines] == [
-        ("long", "gesture", "swipe_up"), ("long", "cancelled", "refractory"),
-    ]  # fmt: skip
-    sensor.sock.send(harness.floats("/long/pressure", sensor.hand.frame(), 0))
-    sensor.begin()
-    client.subscribe("status").line()
-    assert daemon.metric("gestured_dropped_total", reason="address") == 1
 
 
 def test_osc_goes_out_to_every_destination(start) -> None:
