@@ -275,12 +275,6 @@ def test_a_session_s_events_are_apart_and_inside() -> None:
     assert "none" in {event.label for event in take.events}
 
 
-def test_a_session_can_be_told_what_to_perform() -> None:
-    kinds = ["one_tap", "palm", "swipe_left"]
-    take = session(Participant(3), SimulatedSensor.nominal(), generator(3), 30.0, kinds=kinds)
-    assert [event.kind for event in take.events] == kinds
-
-
 def test_an_idle_session_holds_noise_alone() -> None:
     take = session(Participant(3), replace(SimulatedSensor.nominal(), drift=0.0), generator(3), 20.0, kinds=[])
     assert take.events == ()
