@@ -33,9 +33,12 @@ EVENTS = [
     Provisional("a", 1, "one_tap", 0.9, 1.0, 1.5),
     Gesture("a", 1, "one_tap", 0.9, 1, 1.0, 1.5, 2.0, 3, 0, **SAID, own=True),
     Unknown("a", 1, 0.3, 1.0, 1.5, 2.0, 3, 0, **SAID),
+    Unknown("a", 1, 0.3, 1.0, 1.5, 2.0, 3, 0, **SAID, reason="hole", provisional="revoked"),
+    Unknown("a", 1, 0.3, 1.0, 1.5, 2.0, 3, 0, **SAID, reason="inhibited", gates=("door",)),
     Cancelled("a", 1, "held"),
     Release("a", 1, 2.0),
     Gate("a", True, ("door",), 2.5, 2.0),
+    Touch("a", 1, 0, "move", 1.5, 0.5, 1.0, -0.01, 0.0, 212.0, 4, "volume"),
     Touch("a", 1, 0, "up", 1.5, 0.5, 0.5, 0.0, 0.0, 1e60, 4, None, "learned"),
     Status("ok", {"a": "ok"}, "m", 2.0),
 ]

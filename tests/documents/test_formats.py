@@ -8,12 +8,12 @@ from typing import Any, get_args
 
 import pytest
 
-from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gate, Gesture, Place, Provisional, Touch, Unknown, Where
-from gestured.core.messages import parse_subscription
+from gestured.core.events import Cancelled, Event, Gesture, Touch, Unknown
+from gestured.core.messages import error_json, parse_subscription
 from gestured.daemon.explain import explain
 from tests.daemon.parts import settings_of
 from tests.documents.blocks import ROOT, Block, blocks
+from tests.test_fields import LINES
 
 SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
 GESTURES = ("swipe_left",)
@@ -52,35 +52,9 @@ def test_the_schema_has_each_reason(event: type):
         assert f"| `{reason}` |" in (ROOT / "docs" / "wire.md").read_text()
 
 
-def test_lines_of_every_kind_are_valid(valid: Any):
-    scores = {"one_tap": 0.3, "swipe_left": 0.7}
-    where = Where(Place(0.0, 1.0), Place(0.5, 0.5), 0.5, 212.0, 31.5, 2, 0, "volume")
-    for event in (
-        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, where=where),
-        Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores, where=where),
-        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "hole", "revoked", where),
-        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "inhibited", None, where, ("door",)),
-        Gate("a", None, ("door",), None, 2.0),
-        Cancelled("a", 1, "held"),
-        Provisional("a", 1, "swipe_left", 0.9, 0.1, 0.2),
-        Touch("a", 1, 0, "move", 0.2, 0.5, 1.0, -0.01, 0.0, 212.0, 4, "volume"),
-        Touch("a", 1, 0, "up", 0.2, 0.5, 1.0, -0.01, 0.0, 212.0, 4, None, "learned"),
-    ):
-        valid(json.loads(messages.to_json(event, 1.7e9)))
-    valid(
-        json.loads(
-            messages.hello_json(
-                version="1",
-                instance="x",
-                model="m",
-                gestures=["one_tap"],
-                sensors={"a": 0},
-                gates={"a": {"armed": True, "closed": (), "until": 2.0}},
-            )
-        )
-    )
-    valid(json.loads(messages.lost_json(3)))
-    valid(json.loads(messages.error_json("no")))
+@pytest.mark.parametrize("line", [*LINES, json.loads(error_json("no"))], ids=lambda line: line["type"])
+def test_lines_of_every_kind_are_valid(valid: Any, line: dict[str, Any]):
+    valid(line)
 
 
 @pytest.mark.parametrize("block", blocks("checked", "the schema"), ids=str)
