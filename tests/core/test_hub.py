@@ -29,6 +29,7 @@ from gestured.lab.recordings.live import LiveSensor
 from gestured.record import tape_writer
 from tests import encoding
 from tests.daemon.harness import Frame, Hand, blob, floats
+from tests.test_bad_tapes import SETTINGS
 
 FIRST, SECOND, STRANGER = ("10.0.0.1", 1), ("10.0.0.2", 1), ("192.0.2.1", 1)
 GESTURES = ("swipe", "double_tap")
@@ -233,15 +234,8 @@ def is_answer(fact: object) -> bool:
 
 def write(path: Path, arrived: list[Arrived], events: Sequence[Mapping[str, Any]] = (), **settings: object) -> Path:
     """A tape as the daemon would have written it."""
-    told = {
-        "gestures": GESTURES,
-        "model": {"name": "sure", "sha256": "", "rows": 9, "columns": 9},
-        "settings": {
-            "model": "sure", "fallback": [], "grid": None, "clock": "arrival", "stale_s": 1.0, "max_sensors": 64,
-            "allow": [], "sensors": {}, "per_gesture": {},
-            "addresses": {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"},
-        } | settings,
-    }  # fmt: skip
+    model = {"name": "sure", "sha256": "", "rows": 9, "columns": 9}
+    told = {"gestures": GESTURES, "model": model, "settings": SETTINGS | {"model": "sure"} | settings}
     with tape_writer.Writer(path, told, 1 << 30) as writer:
         rest = [*events]
         for t, packet, source in sorted(arrived):
