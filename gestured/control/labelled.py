@@ -41,7 +41,7 @@ class Labelled:
 
     def __init__(self, path: Path, sensor: str) -> None:
         self._path, self._sensor = path, sensor
-        self._found = found = recording.read(path)
+        self._found = found = recording.read_timed(path)
         spans = [found.times_of(g) for g in range(len(found))]
         lengths = [float(times[-1] - times[0]) for times in spans]
         self.seconds = sum(float(np.minimum(np.diff(times), ABSENT_S).sum()) for times in spans)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.record.check import Wrong, check
+from gestured.record.check import Wrong, check, no_seconds
 from gestured.record.files import PRIVATE, atomic_write, open_regular
 from gestured.record.recordings import Recordings
 
@@ -30,6 +30,15 @@ def read(path: str | Path) -> Recordings:
         check(found)
     except Wrong as error:
         raise RecordingError(f"{path}: {error}") from error
+    return found
+
+
+def read_timed(path: str | Path) -> Recordings:
+    """As `read`; raises RecordingError also if the times are no seconds, for whoever counts by the hour."""
+    found = read(path)
+    for i in range(len(found)):
+        if wrong := no_seconds(found.times_of(i)):
+            raise RecordingError(f"{path}: times of recording {i}: {wrong}; are these seconds?")
     return found
 
 

@@ -16,6 +16,7 @@ UNNAMED = "other"  # the label of a performance of which nobody knows the gestur
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; to check their times takes a multiple of their memory
 RECORDINGS = 1 << 20  # of a file, and as many events; bounded since each of their texts is checked alone
 CHARACTERS = 1024  # of one text
+RATES_HZ = 2.0, 2500.0  # frames a second; a sensor sends 5 to 1000, and another unit is a factor of 1000
 LATEST_S = 1e11  # s, the latest time of a frame: the year 5138; times in ms since 1970 are larger, and so refused
 LARGEST = float(np.finfo(np.float32).max)  # counts, as a sensor can send them
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
@@ -70,6 +71,17 @@ def check(r: Recordings) -> None:
                 wrong = int(np.argmin(right))
                 of = "event" if field in EVENT_FIELDS else "recording"
                 raise Wrong(f"{field} of {of} {wrong if owner is None else owner[wrong]}: expected {expected}")
+
+
+def no_seconds(times: NDArray[np.float64]) -> str:
+    """What is wrong with the rate of frames at (T,) s, as where these are milliseconds; empty if nothing is."""
+    steps = np.diff(times)
+    # No pause lengthens the short steps, and frames that arrive together do not shorten the mean.
+    if not len(steps) or (
+        (rate := 1 / np.quantile(steps, 0.1)) >= RATES_HZ[0] and (rate := 1 / steps.mean()) <= RATES_HZ[1]
+    ):
+        return ""
+    return f"expected {RATES_HZ[0]:g} to {RATES_HZ[1]:g} frames a second, found {rate:.3g}"
 
 
 def _shapes(r: Recordings) -> None:

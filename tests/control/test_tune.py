@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -263,9 +264,12 @@ def test_few_hours_do_not_make_it_say_more(models: dict[bool, Model]) -> None:
 
 def test_what_cannot_be_tuned_on_is_one_sentence(run, recorded: Path, tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("no recording")
+    found = read(taps(tmp_path / "taps.npz", onset=30))
+    write(tmp_path / "ms.npz", replace(found, times=1000 * found.times))  # hours in which nothing false was said
     for arguments, reason in (
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
         ([tmp_path / "none.mcap"], "none.mcap"),
+        ([tmp_path / "ms.npz"], "ms.npz: times of recording 0: expected 2 to 2500 frames a second, found 0.015"),
         ([recorded, recorded], "07.npz: expected each file once"),
         ([recorded, "--budget", "0.5"], "hours cannot show it, even if nothing false was said in them, expected at"),
         ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),

@@ -95,15 +95,19 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
     assert (unknown["meant"], unknown["right"]) == (0, None) and known["meant"] == len(events)
 
 
-def test_a_recording_of_one_frame_is_no_place_and_a_blink_is_no_hour(
+def test_one_frame_is_no_place_a_blink_is_no_hour_and_milliseconds_are_no_seconds(
     tmp_path: Path, everyday: Run, said: Callable[..., Any]
 ) -> None:
-    for name, count, rate_hz in (("one", 1, 15.0), ("blink", 300, 1e6), ("good", 60, 15.0)):
+    for name, count, rate_hz in (("one", 1, 15.0), ("blink", 9, 15.0), ("good", 60, 15.0), ("ms", 60, 0.015)):
         write(tmp_path / f"{name}.npz", untouched(np.arange(count) / rate_hz))
     found = said("--recordings", tmp_path / "one.npz", tmp_path / "good.npz")
     assert list(found["places"]) == ["good"] and found["hours"] == round(59 / 15 / 3600, 4)
-    status, _, err = everyday("--recordings", tmp_path / "blink.npz")
-    assert status == 1 and "blink.npz: expected at least 1 s of frames" in err
+    for name, reason in (
+        ("blink", "expected at least 1 s of frames"),
+        ("ms", "times of recording 0: expected 2 to 2500 frames a second, found 0.015; are these seconds?"),
+    ):
+        status, _, err = everyday("--recordings", tmp_path / f"{name}.npz")
+        assert status == 1 and f"{name}.npz: {reason}" in err
 
 
 def test_a_night_in_which_a_sensor_sent_nothing_shows_nothing(tmp_path: Path, said: Callable[..., Any]) -> None:

@@ -16,7 +16,7 @@ from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import recorded
 from gestured.lab.recordings.store import touched
 from gestured.lab.samples import Samples, collect, join
-from gestured.record.arrays import read
+from gestured.record.arrays import read_timed
 from gestured.record.check import SESSION, UNNAMED
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE
@@ -87,7 +87,7 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
     if (cut := int((own.samples.labels != NONE).sum())) < LEAST_CUT:
         raise GesturedError(
             f"{', '.join(map(str, paths))}: expected gestures that the front end cuts out, "
-            f"found {cut} of {own.performed}; are these a sensor's raw counts, at times in seconds?"
+            f"found {cut} of {own.performed}; are these a sensor's raw counts?"
         )
     return own
 
@@ -134,7 +134,7 @@ def dealt(units: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, int]
 
 def _read(path: Path, seen: dict[bytes, Path]) -> Recordings:
     """Read a file; `seen` has the file of each recording that was read: a copy would be learned from while held out."""
-    found = read(path)
+    found = read_timed(path)
     lengths = np.diff(found.offsets)
     if not len(found):
         raise RecordingError(f"{path}: labels: expected recordings, found none")

@@ -10,7 +10,7 @@ from gestured.core.frames import Frame
 from gestured.core.scene import Setup
 from gestured.core.timing import Timing
 from gestured.lab.everyday import FIRST
-from gestured.record.arrays import read
+from gestured.record.arrays import read_timed
 from gestured.record.check import SESSION, UNNAMED
 from gestured.record.judge import NONE, Performed
 from gestured.record.replay import frames_used, opened
@@ -61,7 +61,7 @@ def recorded(path: Path) -> Iterator[Stretch]:
 
 
 def _arrays(path: Path) -> Iterator[Stretch]:
-    found = read(path)
+    found = read_timed(path)
     events = (found.event_recording, found.event_labels, found.event_onsets, found.event_offsets)
     told = [] if any(field is None for field in events) else list(zip(*events, strict=True))  # type: ignore[arg-type]
     for i, whole in enumerate(found.labels):

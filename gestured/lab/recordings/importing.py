@@ -21,12 +21,11 @@ from gestured.client.values import each_once
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.store import compact, join_recordings, touched
 from gestured.record.arrays import write
-from gestured.record.check import SESSION
+from gestured.record.check import SESSION, no_seconds
 from gestured.record.files import open_regular
 from gestured.record.recordings import Recordings
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-RATES_HZ = 2.0, 2500.0  # frames a second; a sensor sends 5 to 1000, and another unit is a factor of 1000
 LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
 NUMBERS = 1 << 27  # numbers of all frames of a file: a gibibyte in memory
 BAD_LINES = 10_000  # lines of a file that may be left out and named; a file with more has another form
@@ -113,11 +112,8 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[tuple[int, str]]]:
         first = f"; {left[0][1]} (line {left[0][0]})" if left else ""
         raise RecordingError(f"{path}: expected frames, found {len(times)} and {len(left)} lines that are none{first}")
     frames, stamps = compact(np.frombuffer(values).reshape(-1, form.rows, form.columns)), np.array(times)
-    steps = np.diff(stamps)
-    # No pause lengthens the short steps, and frames that arrive together do not shorten the mean.
-    if (rate := 1 / np.quantile(steps, 0.1)) < RATES_HZ[0] or (rate := 1 / steps.mean()) > RATES_HZ[1]:
-        expected = f"{RATES_HZ[0]:g} to {RATES_HZ[1]:g} frames a second"
-        raise RecordingError(f"{path}: time: expected {expected}, found {rate:.3g}; see --time-unit")
+    if wrong := no_seconds(stamps):
+        raise RecordingError(f"{path}: time: {wrong}; see --time-unit")
     return _marked(frames, stamps, path, form), left
 
 

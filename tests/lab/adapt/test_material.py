@@ -119,7 +119,7 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
         (["good.npz", "copies.npz"], r"copies.npz: frames of recording 0: expected no copy of one in .*good.npz"),
         (["crowd.npz"], r"subjects: expected at most 1000 people"),
         (["still.npz"], rf"still.npz: expected gestures that the front end cuts out, found 0 of {len(good)};"),
-        (["ms.npz"], r"found 0 of \d+; are these a sensor's raw counts, at times in seconds\?"),
+        (["good.npz", "ms.npz"], r"ms.npz: times of recording 0: expected 2 to 2500 .* found 0.016; are these seconds"),
     ):
         with pytest.raises(GesturedError, match=reason) as told:
             own_recordings([tmp_path / name for name in names])
