@@ -188,8 +188,8 @@ def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: st
     others = multiprocessing.active_children()
     with ExitStack() as stack:
         with stop_later():  # a process that loses its parent while it starts ends in a traceback
-            pool = multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
-            stack.enter_context(pool)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # which processes inherit; Ctrl-C while they start is no error
+            pool = stack.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
         workers = [process for process in multiprocessing.active_children() if process not in others]
         made = pool.imap(make, todo)  # with chunks it gives a generator, which has no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)

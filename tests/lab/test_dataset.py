@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gestured
 from gestured.core.errors import GesturedError
 from gestured.core.events import Event
 from gestured.core.facts import Decided
@@ -152,6 +155,21 @@ def test_a_day_is_the_same_in_another_process(tmp_path: Path, monkeypatch: pytes
 def test_no_more_processes_start_than_there_are_pieces_of_work_and_what_they_make_comes_in_order() -> None:
     made = in_processes(abs, range(2), 5, "")
     assert (next(made), len(multiprocessing.active_children()), next(made)) == (0, 2, 1)
+
+
+def test_ctrl_c_while_processes_start_makes_no_traceback(tmp_path: Path) -> None:
+    """A terminal sends it to all of them, also before they have read what they are to do."""
+    (tmp_path / "program.py").write_text(
+        "import os, signal\n"
+        "from gestured.lab.dataset import in_processes\n"
+        "if __name__ == '__main__':\n"
+        "    print(*in_processes(abs, [-1, -2], 2, ''))\n"
+        "else:\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(Path(gestured.__file__).parents[1])}
+    done = subprocess.run([sys.executable, tmp_path / "program.py"], env=environment, capture_output=True, text=True)
+    assert done.stdout == "1 2\n" and "Traceback" not in done.stderr
 
 
 def killed(number: int) -> int:
