@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
         except (RecordingError, OSError) as error:  # if a file stays, the others are still removed
             stay.append(str(error) if isinstance(error, RecordingError) else f"{file}: {error.strerror}")
             say(f"not removed: {stay[-1]}", to=sys.stderr)
+    done = done and len(stay) < len(found)
     if args.json:
         files = [{"file": str(file), "recordings": own, "of": every} for file, (own, every) in found.items()]
         told = {"participant": name, "removed": done, "files": files, "not_removed": stay, "not_looked_into": unread}
