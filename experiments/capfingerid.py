@@ -14,7 +14,8 @@ import numpy as np
 from gestured.client.values import npz
 from gestured.lab.recordings.store import compact, join_recordings
 from gestured.record.arrays import write
-from gestured.record.check import SESSION, UNNAMED
+from gestured.record.check import SESSION
+from gestured.record.judge import UNNAMED
 from gestured.record.recordings import Recordings
 
 GRID = (27, 15)  # electrodes of the Nexus 5's panel

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally, owners, tallied, whose
+from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, UNNAMED, Performed, Tally, owners, tallied, whose
 
 
 def said(name: str, onset: float, offset: float) -> dict[str, object]:
@@ -52,6 +52,13 @@ def test_of_two_neighbours_the_one_that_overlaps_more():
     assert tally.hear(said("swipe_up", 10.35, 11.0), 11.2).performed is second
 
 
+def test_what_nobody_named_takes_no_event_from_a_gesture_that_it_overlaps():
+    """A finger rests where its swipe ended: one contact, of which only the swipe has a name."""
+    swipe, rest = Performed("swipe_up", "", 10.0, 10.3), Performed(UNNAMED, "", 10.4, 11.4)
+    assert whose(10.0, 11.4, [swipe, rest]) is swipe
+    assert whose(10.4, 11.4, [swipe, rest]) is rest  # though it lies within the tolerance of the swipe
+
+
 # Times on a grid, so that many overlap as much as another, and many lie exactly as far away as is allowed.
 times = st.integers(0, 60).map(lambda n: n / 10)
 spans = st.tuples(times | st.floats(0, 60), times | st.floats(0, 3)).map(lambda span: (span[0], span[0] + span[1]))
@@ -74,7 +81,7 @@ def test_everything_is_counted_once(performances, events):
     assert len(tally.latencies) == counts["right"] + counts["wrong"]
 
 
-@given(st.lists(st.tuples(labels, spans)), st.lists(spans))
+@given(st.lists(st.tuples(labels | st.just(UNNAMED), spans)), st.lists(spans))
 def test_many_belong_to_whom_each_of_them_belongs(performances, heard):
     acts = [Performed(label, label, *span) for label, span in performances]
     expected = [id(whose(onset, offset, acts)) for onset, offset in heard]

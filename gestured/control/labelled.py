@@ -16,8 +16,8 @@ from gestured.core.scene import Scene
 from gestured.core.sensor import ABSENT_S
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
-from gestured.record.check import SESSION, UNNAMED
-from gestured.record.judge import NONE, Outcome, Performed, tallied
+from gestured.record.check import SESSION
+from gestured.record.judge import NONE, UNNAMED, Outcome, Performed, tallied
 from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause long enough for every contact of the last recording to be answered

@@ -19,8 +19,7 @@ from gestured.core.errors import RecordingError
 from gestured.core.points import USUAL
 from gestured.model.model import Model
 from gestured.model.opening import open_model
-from gestured.record.check import UNNAMED
-from gestured.record.judge import NONE
+from gestured.record.judge import NONE, UNNAMED
 from gestured.record.replay import Replay
 
 BAR = 36  # characters

@@ -14,8 +14,7 @@ import numpy as np
 from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL, Curve
 from gestured.model.model import Model
-from gestured.record.check import UNNAMED
-from gestured.record.judge import NONE, Performed, Said, owners, verdicts
+from gestured.record.judge import NONE, UNNAMED, Performed, Said, owners, verdicts
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # the thresholds that may be proposed

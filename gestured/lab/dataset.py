@@ -27,8 +27,7 @@ from gestured.lab.arrays import load, save
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, WINDOW, Sample, Samples, collect, sample
-from gestured.record.check import UNNAMED
-from gestured.record.judge import whose
+from gestured.record.judge import UNNAMED, whose
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
     NON_GESTURES,

@@ -12,7 +12,6 @@ from gestured.model.metadata import GESTURE_NAME
 from gestured.record.recordings import EVENT, FINGERS, Recordings
 
 SESSION = "session"  # the label of a recording that holds many gestures, and marks for each
-UNNAMED = "other"  # the label of a performance of which nobody knows the gesture
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; to check their times takes a multiple of their memory
 RECORDINGS = 1 << 20  # of a file, and as many events; bounded since each of their texts is checked alone
 CHARACTERS = 1024  # of one text

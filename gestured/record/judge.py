@@ -1,9 +1,10 @@
 """The judge: gestures that were performed, compared with the events about them, by one rule and one tolerance.
 
-An event belongs to the performance that it overlaps most in time, if it lies within TOLERANCE_S of that. The first
-gesture event of a performance is `right` or `wrong`. A further one, one without a performance, and one of a performance
-that is no gesture are `false`. A performed gesture without a gesture event is `missed`, also called lost. Times are
-seconds on any clock that performances and events share.
+An event belongs to the performance that it overlaps most in time, if it lies within TOLERANCE_S of that. One that
+nobody named comes last: a finger that goes on touching after a swipe makes one contact of both. The first gesture event
+of a performance is `right` or `wrong`. A further one, one without a performance, and one of a performance that is no
+gesture are `false`. A performed gesture without a gesture event is `missed`, also called lost. Times are seconds on any
+clock that performances and events share.
 """
 
 import math
@@ -15,6 +16,7 @@ from typing import Any, Protocol, TypeVar
 
 LEAST = 20  # gestures, from which on percentiles are given
 NONE = "none"  # the label of whatever is no gesture
+UNNAMED = "other"  # the label of a performance of which nobody knows the gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
 REACH_S = 2 * TOLERANCE_S  # an event farther away cannot belong to a performance, however the times were rounded
 MISSED_AFTER_S = 1.5  # after the end of a performance; longer than any wait for a second tap
@@ -45,7 +47,7 @@ def whose(onset: float, offset: float, performed: Iterable[A]) -> A | None:
     def overlap(act: A) -> float:
         return min(offset, act.offset) - max(onset, act.onset)
 
-    best = max(performed, key=overlap, default=None)
+    best = max(performed, key=lambda act: (overlap(act) > 0.0 and act.label != UNNAMED, overlap(act)), default=None)
     return best if best is not None and overlap(best) > -TOLERANCE_S else None
 
 

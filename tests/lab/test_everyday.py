@@ -29,8 +29,7 @@ from gestured.lab.everyday.stretches import HEARD, WAKING, WOKEN, Stretch, lived
 from gestured.lab.made_of import LINE
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
-from gestured.record.check import UNNAMED
-from gestured.record.judge import NONE, Performed, Said
+from gestured.record.judge import NONE, UNNAMED, Performed, Said
 from gestured.record.recordings import Recordings
 from gestured.record.replay import Replay, opened
 from tests.lab.conftest import Run

@@ -17,7 +17,8 @@ from gestured.lab.dataset import recorded
 from gestured.lab.recordings.store import touched
 from gestured.lab.samples import Samples, collect, join
 from gestured.record.arrays import read_timed
-from gestured.record.check import SESSION, UNNAMED
+from gestured.record.check import SESSION
+from gestured.record.judge import UNNAMED
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE
 

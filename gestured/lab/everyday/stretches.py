@@ -11,8 +11,8 @@ from gestured.core.scene import Setup
 from gestured.core.timing import Timing
 from gestured.lab.everyday import FIRST
 from gestured.record.arrays import read_timed
-from gestured.record.check import SESSION, UNNAMED
-from gestured.record.judge import NONE, Performed
+from gestured.record.check import SESSION
+from gestured.record.judge import NONE, UNNAMED, Performed
 from gestured.record.replay import frames_used, opened
 from gestured.simulator.everyday import day
 from gestured.simulator.places import PLACES

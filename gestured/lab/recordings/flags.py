@@ -12,7 +12,8 @@ from gestured.client.values import bind_address, host_port, npz, number, rows_by
 from gestured.core.address import Address
 from gestured.core.own import is_name
 from gestured.lab.recordings.protocol import pseudonym
-from gestured.record.check import SESSION, UNNAMED
+from gestured.record.check import SESSION
+from gestured.record.judge import UNNAMED
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 FOLDER = Path("recordings")
