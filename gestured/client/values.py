@@ -1,7 +1,9 @@
 """The values on a command line, most of them for argparse's `type`: each is read, or refused in one sentence."""
 
+import filecmp
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from gestured.client.address import named
@@ -80,8 +82,14 @@ def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
 
 
 def each_once(paths: Iterable[Path]) -> None:
-    """Raise GesturedError if a file is named twice: its hours would count twice."""
-    known: dict[Path, Path] = {}
+    """Raise GesturedError if a file is named twice, or its copy is: its hours would count twice."""
+    sized: dict[int, list[Path]] = {}
     for path in paths:
-        if (first := known.setdefault(path.resolve(), path)) is not path:
-            raise GesturedError(f"{path}: expected each file once, found it as {first}, too")
+        size = path.stat().st_size if path.is_file() else -1
+        for first in sized.setdefault(size, []):
+            twice = first.resolve() == path.resolve()
+            with suppress(OSError):  # whoever reads the file says what is wrong with it
+                twice = twice or filecmp.cmp(first, path, shallow=False)
+            if twice:
+                raise GesturedError(f"{path}: expected each file once, found it as {first}, too")
+        sized[size].append(path)

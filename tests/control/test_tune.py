@@ -5,6 +5,7 @@ import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from shutil import copy
 from typing import Any
 
 import numpy as np
@@ -271,6 +272,7 @@ def test_what_cannot_be_tuned_on_is_one_sentence(run, recorded: Path, tmp_path: 
         ([tmp_path / "none.mcap"], "none.mcap"),
         ([tmp_path / "ms.npz"], "ms.npz: times of recording 0: expected 2 to 2500 frames a second, found 0.015"),
         ([recorded, recorded], "07.npz: expected each file once"),
+        ([recorded, copy(recorded, tmp_path / "08.npz")], "08.npz: expected each file once, found it as"),
         ([recorded, "--budget", "0.5"], "hours cannot show it, even if nothing false was said in them, expected at"),
         ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),
         ([recorded, "--model", "nobody"], "nobody: no shipped model"),
