@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from gestured.lab.arrays import load, save
+from gestured.lab.written import load, save
 
 
 def store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epochs: int) -> None:

@@ -23,10 +23,10 @@ from gestured.client.stop import stop_later
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
-from gestured.lab.arrays import load, save
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, WINDOW, Sample, Samples, collect, sample
+from gestured.lab.written import load, save
 from gestured.record.judge import UNNAMED, whose
 from gestured.record.recordings import Recordings
 from gestured.simulator import (

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gestured.client.say import say
 from gestured.lab.decide import Answers, confidence
-from gestured.lab.fit import CLASSES, RECURRENT, padded, targets
+from gestured.lab.fit import CLASSES, RECURRENT, targets
 from gestured.lab.intervals import interval
 from gestured.lab.samples import Samples
 from gestured.lab.train import (
@@ -96,11 +96,8 @@ def model_answers(model: Model, samples: Samples) -> Answers:
         return model.run(samples.features())
     scores = np.zeros((len(samples), len(model.gestures)), np.float32)
     unknown = np.zeros(len(samples), np.float32)
-    for length in np.unique(samples.lengths()):  # a padded window would seem to be over
-        same = np.flatnonzero(samples.lengths() == length)
-        for index in np.array_split(same, -(-len(same) // 200)):
-            windows, beside = padded(samples, index, 100).numpy(), samples.context[index]
-            scores[index], unknown[index] = model.run(windows, beside=beside)
+    for index, windows in samples.alike(200):
+        scores[index], unknown[index] = model.run(windows, beside=samples.context[index])
     return scores, unknown
 
 

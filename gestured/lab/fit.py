@@ -15,7 +15,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.arrays import load, save
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.checkpoints import restore, store
 from gestured.lab.nets import CnnLstm, Lstm, Opinion
@@ -23,6 +22,7 @@ from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
+from gestured.lab.written import load, save
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # the classes of real non-gestures

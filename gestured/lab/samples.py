@@ -1,7 +1,7 @@
 """Samples: windows and what is known of them, from which everything in the lab learns."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -42,6 +42,14 @@ class Samples:
     def lengths(self) -> NDArray[np.int64]:
         """(G,) number of frames of each window."""
         return np.diff(self.offsets)
+
+    def alike(self, most: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
+        """At most so many windows (n, T, R, C) of one length, and their indices (n,): a padded one would seem over."""
+        lengths = self.lengths()
+        for length in np.unique(lengths):
+            same = np.flatnonzero(lengths == length)
+            for index in np.array_split(same, -(-len(same) // most)):
+                yield index, np.stack([self.window(int(i)) for i in index])
 
     def features(self) -> NDArray[np.float32]:
         """(G, F) touch-pattern features."""

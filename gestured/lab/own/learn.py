@@ -48,18 +48,12 @@ class Seen:
     @classmethod
     def by(cls, model: Model, samples: Samples) -> "Seen":
         """Run a model on all samples, in batches of one length."""
-        lengths = samples.lengths()
-        embedding: list[NDArray[np.float64]] = [np.zeros(0)] * len(samples)
-        best, known = np.zeros(len(samples), np.int64), np.zeros(len(samples), bool)
-        for length in np.unique(lengths):
-            index = np.flatnonzero(lengths == length)
-            batch = np.stack([samples.window(int(i)) for i in index])
-            scores, unknown = model.run(batch)
-            best[index] = scores.argmax(axis=1)
-            known[index] = scores.max(axis=1) * (1 - unknown) >= model.threshold
-            for i, row in zip(index, model.embed(batch), strict=True):
-                embedding[int(i)] = row.astype(np.float64)
-        return cls(np.stack(embedding), best, known, samples.labels, samples.kinds, samples.people, model.gestures)
+        found = [(index, *model.run(batch), model.embed(batch)) for index, batch in samples.alike(len(samples))]
+        index, *answers = (np.concatenate(of) for of in zip(*found, strict=True))
+        scores, unknown, embedding = (of[np.argsort(index)] for of in answers)
+        best, known = scores.argmax(axis=1), scores.max(axis=1) * (1 - unknown) >= model.threshold
+        places = embedding.astype(np.float64)
+        return cls(places, best, known, samples.labels, samples.kinds, samples.people, model.gestures)
 
     def plans(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """(N,) whether a sample is a repetition, and (N,) its plan: one person's one kind."""

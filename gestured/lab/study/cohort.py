@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.arrays import load, save
 from gestured.lab.dataset import TRIALS, cuts, in_processes, matched, recorded, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.samples import WINDOW, Samples, collect, sample
 from gestured.lab.train import REAL_FILES
+from gestured.lab.written import load, save
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, Trial, cohort_take
 

@@ -145,16 +145,8 @@ def _wavelets(windows: Rows, values: Values) -> Rows:
 
 def _all_wavelets(samples: Samples, values: Values, padded: bool) -> Rows:
     """Windows of one length together, which is many times as fast as one by one."""
-    lengths = samples.lengths()
-    found: Rows | None = None
-    for length in np.unique(lengths):
-        same = np.flatnonzero(lengths == length)
-        for some in np.array_split(same, -(-len(same) // TOGETHER)):
-            rows = _wavelets(np.stack([samples.window(i) for i in some]), values)
-            found = np.zeros((len(samples), rows.shape[1]), np.float32) if found is None else found
-            found[some] = rows
-    assert found is not None
-    return found
+    index, rows = zip(*((some, _wavelets(of, values)) for some, of in samples.alike(TOGETHER)), strict=True)
+    return np.concatenate(rows)[np.argsort(np.concatenate(index))]
 
 
 WAVELETS = View(_all_wavelets, lambda window, values: _wavelets(window[None], values), ("wavelet", "level", "reading"))
