@@ -125,10 +125,10 @@ def head(of: str = "set") -> tuple[str, str]:
 def row(title: str, values: Mapping[str, Any]) -> str:
     """The line of one set, of an `Evaluation` as a dictionary."""
     ends = values["intervals"]
-    shares = " | ".join(with_interval(values[n], ends[n]) for n in ("right", "wrong", "lost"))
-    rejected = with_interval(values["rejected"], ends["rejected"]) if values["others"] else "-"
-    before = f"{values['right_before']:.3f}"
-    return f"| {title} | {values['gestures']} | {before} | {shares} | {values['others']} | {rejected} |"
+    of = {"right": "gestures", "wrong": "gestures", "lost": "gestures", "rejected": "others"}  # NaN or null without any
+    *shares, rejected = (with_interval(values[n], ends[n]) if values[of[n]] else "-" for n in of)
+    before = f"{values['right_before']:.3f}" if values["gestures"] else "-"
+    return f"| {title} | {values['gestures']} | {before} | {' | '.join(shares)} | {values['others']} | {rejected} |"
 
 
 def with_interval(share: float, ends: Mapping[str, float]) -> str:

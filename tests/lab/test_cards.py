@@ -1,11 +1,15 @@
-"""What a model's card says of the recordings that it learned from."""
+"""What a model's card says of the recordings that it learned from, and of those that judged it."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from gestured.lab.cards import write_cards
+from gestured.lab.cards import row, write_cards
+from gestured.lab.evaluate import outcome
+from gestured.lab.export import plain
 from gestured.lab.train import REAL_FILES, TrainingPlan
 from tests.small_model import build
 
@@ -28,3 +32,10 @@ def test_a_card_names_the_recordings_and_no_others(tmp_path: Path, files: list[s
     card = (tmp_path / "cnn_lstm.md").read_text()
     assert words in card
     assert ("CapFingerId" in card) == (PUBLIC in files)
+
+
+def test_where_nobody_performed_what_is_judged_there_is_a_dash() -> None:
+    """Such as taps and swipes, in recordings of circles alone; figures that were kept have null for NaN."""
+    nothing = np.zeros((0, 10), np.float32), np.zeros(0, np.float32)
+    found = asdict(outcome(nothing, np.zeros(0, np.int64), 0.5, 0, np.zeros(0, np.int64)))
+    assert row("taps", found) == row("taps", plain(found)) == "| taps | 0 | - | - | - | - | 0 | - |"
