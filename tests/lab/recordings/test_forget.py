@@ -169,8 +169,8 @@ def test_a_file_that_cannot_be_removed_is_told_and_keeps_no_other(
     assert (status, err) == (1, f"not removed: {path / '07.npz'}: Permission denied\n")
     assert "the rest is removed; not looked for" in out and "no model to ask: nowhere holds no *.onnx" in out
     assert read(path / "both.npz").subjects.tolist() == ["08"]
-    assert "nothing was removed" in run(capsys, "07", path, "--yes")[1]  # where none can be
-    assert json.loads(run(capsys, "07", path, "--yes", "--json")[1])["removed"] is False
+    assert "nothing was removed" in forget("07", path, "--yes")[1]  # where none can be
+    assert json.loads(forget("07", path, "--yes", "--json")[1])["removed"] is False
 
 
 def test_without_onnx_models_cannot_be_asked_and_recordings_go(
