@@ -102,7 +102,7 @@ class Ahead:
 
     def cells(self) -> tuple[Value, ...]:
         """A row of `HEAD`; a dash for a share or median of nothing."""
-        some = {name: _share(counted) for name, counted in self.counted.items()}
+        some = {name: share_of(counted) for name, counted in self.counted.items()}
         count = {name: len(counted) for name, counted in self.counted.items()}
         rate = (count["confirmed"] + count["taps"]) / self.minutes
         return (
@@ -111,7 +111,8 @@ class Ahead:
         )  # fmt: skip
 
 
-def _share(counted: Sequence[tuple[bool, int]]) -> str:
+def share_of(counted: Sequence[tuple[bool, int]]) -> str:
+    """A share with its interval over people; a dash for one of nothing."""
     share, low, high = interval([so for so, _ in counted], [of for _, of in counted])
     return with_interval(share, {"low": low, "high": high}) if counted else "-"
 

@@ -8,6 +8,8 @@ sessions. If no event differs, a line in experiments/same.txt says so, and what 
 this code, too: `make figures ARGS=--stale` does not list these tables. Otherwise the first event that differs is shown.
 
 `--but Unknown.reason` passes over the reasons of unknown events, for a change that means to give other reasons.
+`--rates 13.6 16.6` plays only sensors at these rates, for a change that is meant for others; tables of others must then
+be made again by their commands.
 """
 
 import argparse
@@ -57,6 +59,11 @@ class Stream(NamedTuple):
 
     times: NDArray[np.float64]  # (N,) s
     frames: NDArray[Any]  # (N, R, C) counts
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second, as they usually come."""
+        return float(1.0 / np.median(np.diff(self.times)))
 
 
 def streams(days: int, takes: int, real: Path | None) -> Iterator[list[Stream]]:
@@ -153,6 +160,9 @@ def main() -> None:
     parser.add_argument(
         "--but", default="", metavar="EVENT.FIELD", help="a field that may differ, such as Unknown.reason"
     )
+    parser.add_argument(
+        "--rates", type=float, nargs=2, metavar=("LOW", "HIGH"), help="play only sensors at these rates in Hz"
+    )
     parser.add_argument("--tell", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.tell:
@@ -161,11 +171,14 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         count = args.days - (-args.takes // OF_A_PART) + bool(args.real)
-        write(progress(streams(args.days, args.takes, args.real), count, "streams"), Path(folder))
+        low, high = args.rates or (0.0, np.inf)
+        parts = progress(streams(args.days, args.takes, args.real), count, "streams")
+        write(([one for one in part if low <= one.rate_hz <= high] for part in parts), Path(folder))
         here, there = (told_by(root, folder) for root in (Path(), args.before))
         digests = next(here).strip(), next(there).strip()
         events = compared(here, there, args.but)
     what = f"{args.days * DAY_S / 3600:g} h of days, {args.takes} takes{' and real sessions' if args.real else ''}"
+    what += f", of sensors at {low:g} to {high:g} Hz" if args.rates else ""
     line = f"{' '.join(digests)} {date.today()} {events} events of {what}{args.but and f', but for {args.but}'}"
     print(line)
     with HELD.open("a") as file:
