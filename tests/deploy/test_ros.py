@@ -3,6 +3,7 @@
 It needs the environment of `make ros`. What needs no ROS is tested without.
 """
 
+import importlib
 import itertools
 import json
 import re
@@ -10,11 +11,14 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 from xml.etree import ElementTree
 
 import numpy as np
@@ -67,12 +71,13 @@ WHERE = {
     "contacts": 1,
     "bridged": 2,
 }
-PLACED = GESTURE | {"where": WHERE | {"zone": None}, "provisional": "confirmed", "own": True}
+# "test" excuses the age of what comes later than a second after its decision: the node would drop it.
+PLACED = GESTURE | {"where": WHERE | {"zone": None}, "provisional": "confirmed", "own": True, "test": True}
 PROVISIONAL = {
     "type": "provisional",
     **{name: GESTURE[name] for name in ("sensor", "id", "gesture", "confidence", "onset")},
 }
-PROVISIONAL["decided"] = 1000.25
+PROVISIONAL |= {"decided": 1000.25, "test": True}
 TOUCH = {"type": "touch", "sensor": "armrest", "id": 4, "touch": 1, "phase": "up", "t": 1000.25, "x": 0.5, "y": 0.0}
 TOUCH |= {"dx": -0.125, "dy": 0.0, "pressure": 80.5, "area": 3, "zone": "volume", "reason": "learned"}
 STATUS = {"type": "status", "state": "ok", "sensors": {"armrest": "stale"}, "model": "cnn_lstm", "time": 1000.0}
@@ -122,6 +127,35 @@ def test_a_message_has_the_fields_of_its_event(name: str):
     lines = (ROS2 / "gestured_msgs" / "msg" / f"{name.capitalize()}.msg").read_text().splitlines()
     fields = {line.split()[1] for line in lines if not line.startswith("#")}
     assert fields - {"instance", "states"} == set(schema) - {"type", "scores", "gates"}
+
+
+class StandIn:
+    """In place of rclpy's node: it keeps what is published, and whatever else it is asked to do it does not."""
+
+    def __init__(self, name: str) -> None:
+        self.published: list[dict[str, Any]] = []
+
+    def declare_parameter(self, name: str, default: object) -> object:
+        return SimpleNamespace(value=default)
+
+    def create_publisher(self, kind: object, topic: str, quality: object) -> object:
+        return SimpleNamespace(msg_type=kind, publish=lambda told: self.published.append(json.loads(told.data)))
+
+    def __getattr__(self, name: str) -> Any:
+        return MagicMock()
+
+
+def test_an_event_that_is_older_than_a_second_is_not_published(monkeypatch: pytest.MonkeyPatch):
+    ros = MagicMock(Node=StandIn, String=SimpleNamespace)
+    parts = ("rclpy", *(f"rclpy.{part}" for part in ("exceptions", "executors", "node", "qos", "signals", "task")))
+    for name in (*parts, "sensor_msgs", "sensor_msgs.msg", "std_msgs", "std_msgs.msg", "std_srvs", "std_srvs.srv"):
+        monkeypatch.setitem(sys.modules, name, ros)
+    module = importlib.import_module("deploy.ros2.gestured_ros2.gestured_ros2.node")
+    monkeypatch.setattr(module, "Subscriber", MagicMock())
+    node, now = module.Gestures(), time.time()
+    node._lines += [HELLO, *(GESTURE | {"id": id, "decided": now - age} for id, age in enumerate((0.0, 3.0, 0.0)))]
+    node._take()
+    assert [event["id"] for event in node.published if event["type"] == "gesture"] == [0, 2]
 
 
 class Process:
@@ -283,9 +317,9 @@ def test_who_comes_late_is_told_the_status_and_that_the_daemon_went_and_returned
     peer.say(listen=ros.topic("armrest", "gesture"), latched=False)
     line: dict[str, Any] = {"topic": ""}
     while not line["topic"].endswith("gesture"):  # the listener is found in its own time
-        fake.say(GESTURE, status)
+        fake.say(PLACED, status)
         line = peer.line()
-    assert line["data"] == GESTURE | {"instance": "b"}
+    assert line["data"] == PLACED | {"instance": "b"}
 
 
 def same(told: dict[str, Any], event: dict[str, Any]) -> None:

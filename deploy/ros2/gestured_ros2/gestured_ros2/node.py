@@ -22,7 +22,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.daemon import GONE, NOTICE_S, Daemon, Line, follow
+from gestured.bridge.daemon import GONE, NOTICE_S, OLD_S, Daemon, Line, follow
 from gestured.bridge.gates import OFF, ON, Gate
 from gestured.bridge.ros_names import token
 from gestured.client.address import named
@@ -105,7 +105,12 @@ class Gestures(Node):  # type: ignore[misc]  # rclpy has no types
             line = self._lines.popleft()
             self._daemon.take(line)
             if "sensor" in line:
-                self._publish(line)
+                age = self._daemon.age(line, time.time())
+                if age > OLD_S:
+                    words = f"a {line['type']} of {line['sensor']} is dropped: it is {age:.1f} s old"
+                    self.get_logger().warning(words, throttle_duration_sec=WARNED_S)
+                else:
+                    self._publish(line)
             elif line["type"] == "status":
                 self._send(self._status, line)
                 if self._gate is not None and self._daemon.is_silent_by(self._gate.name):
