@@ -169,7 +169,7 @@ class Session:
         words = [
             "",
             f"touched for {take.seconds:.2f} s, frames: {take.release - take.onset + 1}",
-            f"peak {peak:.0f} counts, {peak / max(take.noise, 1e-9):.0f} times the noise",
+            f"peak {peak:{'.0f' if peak >= 10 else '.2g'}} counts, {peak / max(take.noise, 1e-9):.0f} times the noise",
             "good" if not wrong else "",
             "",
         ]

@@ -193,6 +193,16 @@ def test_a_doubtful_model_or_one_that_agrees_says_nothing(tmp_path: Path, take: 
     assert "looked like" not in script.shown
 
 
+def test_the_peak_of_a_sensor_that_sends_fractions_is_told(tmp_path: Path) -> None:
+    share = 0.62 / GOOD.peak()
+    frames = tuple(
+        replace(frame, values=share * values) for frame, values in zip(GOOD.frames, GOOD.values(), strict=True)
+    )
+    sensor = FakeSensor(replace(GOOD, frames=frames, noise=0.031))
+    script = run(tmp_path / "07.npz", sensor, ("in place", "\n"), ("Enter keep", "d"))
+    assert "peak 0.62 counts, 20 times the noise" in script.shown
+
+
 def test_everything_fits_into_80_columns_and_the_measured_rate_is_shown(tmp_path: Path) -> None:
     frames = list(GOOD.frames)
     frames[GOOD.release] = replace(frames[GOOD.release], lost=2)
