@@ -24,9 +24,9 @@ Make recordings of CSV files. What cannot be used is told and
 counted: the file, the line, the field, and what was expected.
 
 A file has a row for each frame: time, then rows x columns values, row by row,
-the top row first; with commas, a heading or none. With a gesture as --label the
-file holds one performance of it, whose touched frames are marked as the daemon
-would see them."""
+the top row first; with commas, or semicolons and decimal commas; a heading or
+none. With a gesture as --label the file holds one performance of it, whose
+touched frames are marked as the daemon would see them."""
 Add = Callable[[str, str, str], Parser]
 
 

@@ -38,7 +38,7 @@ class Csv:
     """What is to be known of a CSV file beside its content.
 
     A file holds one recording, a row for each frame: time, then rows x columns values, row by row, the top row first;
-    commas between them, a heading or none.
+    commas between them, or semicolons and decimal commas, a heading or none.
     """
 
     rows: int
@@ -88,7 +88,7 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[tuple[int, str]]]:
     last: list[float] = []
     left: list[tuple[int, str]] = []
     for number, text in _lines(path):
-        cells = text.split(",")
+        cells = text.replace(",", ".").split(";") if ";" in text else text.split(",")
         if number == 1 and _number(cells[0]) is None:
             continue  # a heading
         try:

@@ -49,6 +49,17 @@ def test_a_csv_file_is_read_as_it_was_written(unit: str, scale: float, tmp_path:
     assert abs(made.times[found.releases[0]] - event.offset_s) < 0.15
 
 
+def test_semicolons_and_decimal_commas_are_read_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As a spreadsheet writes them where numbers have decimal commas."""
+    made, out = take(), tmp_path / "out.npz"
+    heading = "time;" + ";".join(f"t{k}" for k in range(81))
+    lines = [line.replace(",", ";").replace(".", ",") for line in csv_lines(made)]
+    status, _, _ = run(capsys, "--participant", "07", written(tmp_path / "a.csv", [heading, *lines]), "--out", out)
+    assert status == 0
+    np.testing.assert_array_equal(read(out).frames, made.frames)
+    np.testing.assert_allclose(read(out).times, made.times - made.times[0], atol=1e-9)
+
+
 BAD = {
     "too few": ("1.0,2,3", "line: expected 82 numbers, found 3"),
     "a word": ("1.0," + ",".join(["x"] * 81), "number 2: expected a finite number, found 'x'"),
@@ -85,7 +96,7 @@ def test_times_in_another_unit_are_refused_though_frames_were_lost(
 
 def test_a_file_of_another_form_is_refused_and_the_others_are_taken(tmp_path: Path, imports: Run) -> None:
     good = written(tmp_path / "good.csv", csv_lines(take()))
-    other = written(tmp_path / "other.csv", ["1;2;3"] * 50)
+    other = written(tmp_path / "other.csv", ["1 2 3"] * 50)
     idle = take()
     still = written(tmp_path / "still.csv", csv_lines(idle)[:8])
     out = tmp_path / "out.npz"
