@@ -6,7 +6,7 @@ An invalid request is a ProtocolError with the reason `subscription`.
 import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, get_args
+from typing import Any, TypedDict, Unpack, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
@@ -58,11 +58,19 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     return json_line(line)
 
 
-def hello_json(**told: object) -> bytes:
-    """The first line to a client: `version`, `instance`, `model` and `gestures`, and by sensor `sensors` and `gates`.
+class Hello(TypedDict):
+    """What the first line to a client says."""
 
-    `sensors` has the last sequence of each, `gates` its gates and arming.
-    """
+    version: str
+    instance: str
+    model: str
+    gestures: Sequence[str]
+    sensors: Mapping[str, int]  # by sensor: its last sequence
+    gates: Mapping[str, Mapping[str, Any]]  # by sensor: its gates and arming
+
+
+def hello_json(**told: Unpack[Hello]) -> bytes:
+    """The first line to a client."""
     return json_line({"type": "hello", "protocol": 1, **told})
 
 

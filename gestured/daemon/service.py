@@ -83,9 +83,14 @@ class Service:
 
     def _hello(self) -> bytes:
         parts = self.parts
-        who = {"version": __version__, "instance": parts.instance, "model": parts.ladder.active}
-        sensors, gates = parts.hub.sequences(), parts.listening()
-        return messages.hello_json(**who, gestures=parts.gestures, sensors=sensors, gates=gates)
+        return messages.hello_json(
+            version=__version__,
+            instance=parts.instance,
+            model=parts.ladder.active,
+            gestures=parts.gestures,
+            sensors=parts.hub.sequences(),
+            gates=parts.listening(),
+        )
 
     def _known(self) -> dict[str, Sequence[str]]:
         """The types, gestures and zones that a client may name in a subscription."""
