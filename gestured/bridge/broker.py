@@ -17,18 +17,20 @@ ANY_BYTES = 268_435_460  # the largest packet that MQTT knows
 HEADER_BYTES = 15  # the most bytes of a PUBLISH of ours beside its topic and payload
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD as the broker knows them"
 # Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting does not help.
-TOO_LARGE, NO_RETAIN, NO_QOS_1 = 149, 154, 155
+NOT_ALLOWED, TOO_LARGE, NO_RETAIN, NO_QOS_1 = 135, 149, 154, 155
 REFUSALS = {
     132: "it does not speak MQTT 5: use a broker that does, such as mosquitto 1.6 or newer",
     133: "it does not take the name gestured-{host}: choose another one with --host",
     134: f"user or password are wrong: {_LOGIN}",
-    135: f"this user may not connect: {_LOGIN}",
+    NOT_ALLOWED: f"this user may not connect: {_LOGIN}",
     138: "we are banned: ask whoever runs it",
     142: "another bridge has the same name, {host}: give each its own with --host",
     TOO_LARGE: "it takes no packets as large as ours, which have a few KiB: let it take them",
     NO_RETAIN: "it retains nothing, and whether a sensor is there must be told to whoever comes later: let it retain",
     NO_QOS_1: "it takes no messages with QoS 1, and others may get lost: let it take them",
 }
+# Reason codes of a PUBLISH: unspecified, one of the broker's own, number in use, quota. The next message may be taken.
+PASSING = frozenset((128, 131, 145, 151))
 CLOSED, SILENT = 128, 141  # codes of the library: the broker gave no code, or was silent for too long
 
 
@@ -135,10 +137,12 @@ class Broker:
 
         client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
 
-    def unwritable(self, code: object) -> BridgeError:
-        """The error to raise if the broker does not let the bridge publish."""
-        topics = f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/#"
-        return self._unallowed(f"publish ({code})", f"write {topics}")
+    def refused(self, code: Any, topic: str) -> BridgeError:
+        """What to say if the broker refuses a message at a topic with a reason code."""
+        if code.value == NOT_ALLOWED:
+            topics = f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/#"
+            return self._unallowed(f"publish ({code})", f"write {topics}")
+        return BridgeError(f"the broker {self.address} refuses a message at {topic}: {code}")
 
     def unreadable(self, code: object, topic: str) -> BridgeError:
         """The error to raise if the broker does not let the bridge subscribe to commands."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gestured.bridge.broker import ANY_BYTES, HEADER_BYTES, TOO_LARGE, Broker, properties, topic_of
+from gestured.bridge.broker import ANY_BYTES, HEADER_BYTES, PASSING, TOO_LARGE, Broker, properties, topic_of
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
 from gestured.bridge.gates import OFF, ON, Gate
@@ -64,7 +64,8 @@ class Mqtt:
         self._sent: dict[int, Outgoing] = {}  # by message number: events that the broker has not acknowledged
         self._changed = False  # whether a command has changed what the broker should retain
         self._changes: Iterator[tuple[str, str]] = iter(())  # retained messages to be published
-        self._changing: set[int] = set()  # numbers of retained messages that the broker has not acknowledged
+        self._changing: dict[int, str] = {}  # number -> topic: retained messages that the broker has not acknowledged
+        self._refusals: set[int] = set()  # reason codes of refused messages that were logged
         self._farewell = 0  # number of the last message, "offline"
         self._most = 0  # messages that may be in flight, without the last one
         self._largest = ANY_BYTES  # bytes of the largest packet that the broker takes
@@ -150,7 +151,7 @@ class Mqtt:
         self._most = max(min(IN_FLIGHT, getattr(terms, "ReceiveMaximum", IN_FLIGHT)) - 1, 1)
         if self._gate is not None:
             self._broker.hear(client, self._commanded)
-        self._retained.forget()
+        self._retained.forget()  # the broker may have lost what it retained
         self._changes = self._retained.changes()
         self._changing.clear()
         self._waiting.extendleft(reversed(self._sent.values()))  # what was not acknowledged comes first
@@ -174,13 +175,20 @@ class Mqtt:
     def _taken(self, client: Any, number: int, code: Any) -> None:
         if client is not self._client:
             return
+        event, retained = self._sent.pop(number, None), self._changing.pop(number, None)
         if code.is_failure:
-            raise self._broker.unwritable(code)
-        if number == self._farewell:
+            error = self._broker.refused(code, event.topic if event else retained or self._availability)
+            if code.value not in PASSING:
+                raise error
+            if code.value not in self._refusals:
+                self._refusals.add(code.value)
+                self._counts.say(str(error))
+            if retained:
+                self._retained.forget(retained)  # the next status publishes it again
+        elif number == self._farewell:
             client.disconnect()
-        elif self._sent.pop(number, None) is not None:
-            self._counts.add("events", "sent")
-        self._changing.discard(number)
+        if event is not None:
+            self._counts.add("events", "refused" if code.is_failure else "sent")
         self._send()
 
     def _subscribed(self, client: Any, codes: Any) -> None:
@@ -221,7 +229,7 @@ class Mqtt:
         while len(self._changing) < most and len(self._sent) + len(self._changing) < self._most:
             change = next(self._changes, None)
             if change is not None:
-                self._changing.add(self._publish(*change, retain=True))
+                self._changing[self._publish(*change, retain=True)] = change[0]
             elif self._changed and not self._changing:  # many changes at a time are looked for once
                 self._changed, self._changes = False, self._retained.changes()
             else:

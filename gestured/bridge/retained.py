@@ -38,9 +38,9 @@ class Retained:
         self._daemon, self._host, self._prefix, self._discovers = daemon, host, prefix, discovers
         self._kept: dict[str, str | None] = {}  # by topic: the retained payload; None if it is not known
 
-    def forget(self) -> None:
-        """Forget the retained payloads, since the broker of a new connection may have lost them."""
-        self._kept = dict.fromkeys(self._kept)
+    def forget(self, *topics: str) -> None:
+        """Forget what is retained at these topics (none: at all), so that it is published again."""
+        self._kept |= dict.fromkeys(topics or self._kept)
 
     def changes(self) -> Iterator[tuple[str, str]]:
         """(topic, payload) of each message to publish; an empty payload makes the broker forget a topic.

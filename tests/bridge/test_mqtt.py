@@ -12,6 +12,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -409,6 +410,46 @@ def test_a_broker_gets_no_more_messages_at_a_time_than_it_asks_for(bridge, fake)
                         events += topic.endswith("/armrest/gesture")
                 assert len(waiting) <= 3
                 connection.sendall(b"\x40\x02" + waiting.pop(0))  # PUBACK
+
+
+@contextmanager
+def let_in(bridge: Callable[..., Process], fake: FakeDaemon) -> Iterator[tuple[Process, socket.socket]]:
+    """A bridge, and the connection of a broker that has just accepted it."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        to = ("--broker", f"127.0.0.1:{server.getsockname()[1]}", "--metrics", "127.0.0.1:0")
+        process = bridge("mqtt", *to, "--socket", fake.path, "--host", "car")
+        fake.accept()
+        with server.accept()[0] as connection:
+            connection.settimeout(DEADLINE_S)
+            assert connection.recv(65536).startswith(b"\x10")  # CONNECT
+            connection.sendall(b"\x20\x03\x00\x00\x00")  # CONNACK
+            yield process, connection
+
+
+@pytest.mark.parametrize("code", [128, 131, 145, 151])
+def test_a_message_that_the_broker_does_not_take_now_ends_nothing(bridge, fake, code: int):
+    """As if a quota is exceeded: what is to be retained is published again, and events go on."""
+    wanted, refused, taken = {f"gestured/car/armrest/{level}" for level in ("state", "gesture")}, set(), set()
+    with let_in(bridge, fake) as (process, connection):
+        while not wanted <= taken:
+            fake.say(STATUS, gesture(1))
+            while select.select([connection], [], [], 0.05)[0]:
+                for number, topic in published(connection.recv(65536)):
+                    first = topic in wanted - refused
+                    (refused if first else taken).add(topic)
+                    connection.sendall(b"\x40\x03" + number + bytes([code if first else 0]))  # PUBACK (3.4.2.1)
+        assert process.said().count("refuses a message at") == 1 and "access list" not in process.said()
+        assert '_events_total{bridge="mqtt",result="refused"} 1.0' in page(process.ready()["metrics"])
+
+
+@pytest.mark.parametrize("code", [144, 153])
+def test_a_message_that_the_broker_never_takes_ends_the_bridge_with_its_topic(bridge, fake, code: int):
+    with let_in(bridge, fake) as (process, connection):
+        number, topic = next(published(connection.recv(65536)))
+        connection.sendall(b"\x40\x03" + number + bytes([code]))  # PUBACK
+        assert process.end() == 1
+        assert f"refuses a message at {topic}: " in process.said() and "access list" not in process.said()
 
 
 def test_a_broker_far_away_hears_first_that_the_daemon_is_gone(bridge, fake):
