@@ -22,6 +22,7 @@ from gestured.record.replay import maker
 from tests.daemon import harness, tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor
 
+QUIET = 20  # frames after a contact, in which all is decided that it leaves open
 KINDS = ("gesture", "unknown", "cancelled", "onset", "release")
 
 
@@ -67,15 +68,22 @@ def test_online_is_offline(start: Callable[..., Daemon], model: Path, tmp_path: 
 
 
 def said(daemon: Daemon, name: str, timed: list[tuple[float, harness.Frame]], count: int) -> list[harness.Line]:
-    """The first lines that a daemon says of a sensor whose frames were felt at these times."""
+    """The first lines that a daemon says of a sensor whose frames were felt at these times.
+
+    They go as fast as it goes, without overrunning a socket's buffer, and wait only while nobody touches the sensor:
+    during a contact the daemon would decide by the time that passes meanwhile.
+    """
     client = daemon.client().subscribe(*KINDS, sensors=[name])
-    sensor = Sensor(daemon, name)
-    taken = daemon.frames()
-    for n, (t, frame) in enumerate(timed, start=1):
+    sensor, packets = Sensor(daemon, name), list[bytes]()
+    for t, frame in timed:
         sensor.t = 1e9 + t - 1 / harness.RATE_HZ
-        sensor.send([frame])
-        while n % 100 == 0 and daemon.frames() < taken + n:
-            pass  # as fast as it goes, without overrunning a socket's buffer
+        packets.append(sensor.packet(frame))
+    taken, quiet = daemon.frames(), 0
+    for n, ((_, frame), packet) in enumerate(zip(timed, packets, strict=True), start=1):
+        sensor.sock.send(packet)
+        quiet = quiet + 1 if frame.max() < 30 else 0
+        while quiet == QUIET and daemon.frames() < taken + n:
+            pass
     return [client.line() for _ in range(count)]
 
 
