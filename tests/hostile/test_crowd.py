@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,8 @@ from tests.hostile.grammar import TYPES, violations
 from tests.hostile.stall import play
 from tests.hostile.test_network import play as send
 from tests.hostile.test_network import swipe
+
+MOST_WAITED_S = 5.0  # a daemon that had to wait longer for a processor shows nothing; the test takes 20 s
 
 
 @pytest.mark.hostile
@@ -59,9 +62,14 @@ def test_while_a_flood_lasts_the_gestures_of_others_are_right(start, kind: str, 
     flood += ["--rate", str(rate), "--ports", str(ports)]
     with subprocess.Popen(flood, stdout=subprocess.DEVNULL):
         result = play(daemon, 4 if kind == "claims" else 23, 15.0, 0.0, 20.0)
-    print(f"{kind}, {rate} packets/s from {ports} ports: {result}")
-    assert result.violations == [] and result.verdicts["wrong"] + result.verdicts["false"] == 0
-    assert result.verdicts["right"] >= 0.95 * (result.verdicts["right"] + result.verdicts["missed"])
+    waited_s = int(Path(f"/proc/{daemon.process.pid}/schedstat").read_text().split()[1]) / 1e9  # for a processor
+    print(f"{kind}, {rate} packets/s from {ports} ports: {result}; the daemon waited for {waited_s:.1f} s")
+    assert result.violations == []
+    right, missed = result.verdicts["right"], result.verdicts["missed"]
+    good = result.verdicts["wrong"] + result.verdicts["false"] == 0 and right >= 0.95 * (right + missed)
+    if not good and waited_s > MOST_WAITED_S:
+        pytest.skip(f"the machine is too busy: the daemon waited {waited_s:.1f} s for a processor")
+    assert good, result
 
 
 def connect(daemon: Daemon) -> socket.socket:
