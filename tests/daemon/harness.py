@@ -267,10 +267,9 @@ class Sensor:
         return encoding.bundle([self._encode(f"/{self.name}/pressure", frame, self.count)], self.t)
 
     def send(self, *parts: list[Frame]) -> "Sensor":
-        """Send the frames of all parts."""
-        for part in parts:
-            for frame in part:
-                self.sock.send(self.packet(frame))
+        """Send the frames of all parts, as closely together as can be: the daemon decides by the time between them."""
+        for packet in [self.packet(frame) for part in parts for frame in part]:
+            self.sock.send(packet)
         return self
 
     def begin(self) -> "Sensor":
