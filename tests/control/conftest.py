@@ -79,6 +79,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
     def finish(*arguments: object, env: Mapping[str, str] = {}) -> tuple[int, str, str]:
         handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
         with TemporaryFile("w+") as out, TemporaryFile("w+") as err, monkeypatch.context() as patch:
+            patch.setattr(os, "nice", lambda more: more)  # it would hold for this process, and all tests that follow
             patch.setattr(sys, "stdin", None)
             patch.setattr(sys, "stdout", out)
             patch.setattr(sys, "stderr", err)
