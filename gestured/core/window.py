@@ -107,7 +107,8 @@ class Window:
         """Frames at `rate_hz`, by time stamps: averaged if the sensor is faster, interpolated if it is slower.
 
         Frames of a sensor that is about as fast as the model are taken as they are, since both blur taps: at 20 Hz a
-        gesture then seems a third slower, which people differ by anyway (`experiments.rates`). `usual` is the sensor's interval in seconds, of all frames of the segment, since those of a tap are too few.
+        gesture then seems a third slower, which people differ by anyway (`experiments.rates`). `usual` is the sensor's
+        interval in seconds, of all frames of the segment, since those of a tap are too few.
         """
         if len(times) < 2:
             return frames

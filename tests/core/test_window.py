@@ -188,10 +188,11 @@ def linear(times: Array, seed: int) -> Array:
 
 
 def other_rate(rate: float) -> bool:
-    return abs(15 / rate - 1) > 0.13
+    return abs(15 / rate - 1) > 0.46
 
 
 rates = st.floats(5, 1000).filter(other_rate)
+near = st.floats(10.4, 27)  # taken as they are
 
 
 @given(rates, st.integers(3, 60), st.floats(0, 0.4), seeds)
@@ -212,13 +213,13 @@ def test_what_changes_evenly_still_does_at_any_rate(rate: float, frames: int, ji
     assert found[inside] == pytest.approx(expected[inside], abs=0.01)
 
 
-@given(st.floats(13.5, 16.8), st.integers(1, 40), seeds)
+@given(near, st.integers(1, 40), seeds)
 def test_a_rate_near_the_models_is_taken_as_it_is(rate: float, n: int, seed: int) -> None:
     frames = np.random.default_rng(seed).uniform(0, FULL, (n, 9, 9))
     assert scaled(TEXYZ, frames, np.arange(n) / rate) == pytest.approx(frames, abs=1e-3)
 
 
-@given(st.floats(13.5, 16.8) | rates, st.integers(12, 40), st.sets(st.integers(1, 38), max_size=3), seeds)
+@given(near | rates, st.integers(12, 40), st.sets(st.integers(1, 38), max_size=3), seeds)
 def test_lost_frames_are_filled_in(rate: float, n: int, lost: set[int], seed: int) -> None:
     kept = [k for k in range(n) if k not in lost or k == n - 1]
     times = np.arange(n) / rate
@@ -242,7 +243,7 @@ def test_idle_frames_around_the_gesture_change_nothing(rate: float, before: int,
 
 
 @example(38.0, 0, 0.5)  # 7.5 steps long
-@given(rates | st.floats(13.5, 16.8), seeds, st.sampled_from([0.5, 1.0, 1 << 20]))
+@given(rates | near, seeds, st.sampled_from([0.5, 1.0, 1 << 20]))
 def test_only_differences_of_time_matter(rate: float, seed: int, start: float) -> None:
     frames = np.random.default_rng(seed).uniform(0, FULL, (20, 9, 9))
     times = np.round(np.arange(20) / rate * 2**20) / 2**20

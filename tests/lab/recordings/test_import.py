@@ -49,13 +49,12 @@ def test_a_csv_file_is_read_as_it_was_written(unit: str, scale: float, tmp_path:
     assert abs(made.times[found.releases[0]] - event.offset_s) < 0.15
 
 
-def test_semicolons_and_decimal_commas_are_read_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_semicolons_and_decimal_commas_are_read_too(tmp_path: Path, imports: Run) -> None:
     """As a spreadsheet writes them where numbers have decimal commas."""
     made, out = take(), tmp_path / "out.npz"
     heading = "time;" + ";".join(f"t{k}" for k in range(81))
     lines = [line.replace(",", ";").replace(".", ",") for line in csv_lines(made)]
-    status, _, _ = run(capsys, "--participant", "07", written(tmp_path / "a.csv", [heading, *lines]), "--out", out)
-    assert status == 0
+    assert imports("--participant", "07", written(tmp_path / "a.csv", [heading, *lines]), "--out", out)[0] == 0
     np.testing.assert_array_equal(read(out).frames, made.frames)
     np.testing.assert_allclose(read(out).times, made.times - made.times[0], atol=1e-9)
 
