@@ -8,7 +8,7 @@ sessions. If no event differs, a line in experiments/same.txt says so, and what 
 this code, too: `make figures ARGS=--stale` does not list these tables. Otherwise the first event that differs is shown.
 
 `--but Unknown.reason` passes over the reasons of unknown events, for a change that means to give other reasons.
-`--rates 13.6 16.6` plays only sensors at these rates, for a change that is meant for others; tables of others must then
+`--nominal` plays only nominal sensors and real ones, for a change that is meant for others; tables of others must then
 be made again by their commands.
 """
 
@@ -60,16 +60,11 @@ class Stream(NamedTuple):
     times: NDArray[np.float64]  # (N,) s
     frames: NDArray[Any]  # (N, R, C) counts
 
-    @property
-    def rate_hz(self) -> float:
-        """Frames a second, as they usually come."""
-        return float(1.0 / np.median(np.diff(self.times)))
 
-
-def streams(days: int, takes: int, real: Path | None) -> Iterator[list[Stream]]:
-    """The streams that both checkouts play, in parts. Every second day has a sensor drawn at random."""
+def streams(days: range, takes: int, real: Path | None) -> Iterator[list[Stream]]:
+    """The streams that both checkouts play, in parts. Days of odd numbers have a sensor drawn at random."""
     places = [*PLACES.values(), *CHANCE.values()]
-    for n in range(days):
+    for n in days:
         rng = generator(SEED, 0xDA, n)
         sensor = any_sensor(rng, float(rng.random()))
         slow = replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)) if n % 2 else None
@@ -160,25 +155,22 @@ def main() -> None:
     parser.add_argument(
         "--but", default="", metavar="EVENT.FIELD", help="a field that may differ, such as Unknown.reason"
     )
-    parser.add_argument(
-        "--rates", type=float, nargs=2, metavar=("LOW", "HIGH"), help="play only sensors at these rates in Hz"
-    )
+    parser.add_argument("--nominal", action="store_true", help="play only nominal sensors and real ones")
     parser.add_argument("--tell", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.tell:
         for line in told(args.before, str(shipped()["cnn_lstm"])):
             print(line)
         return
+    days, takes = (range(0, args.days, 2), 0) if args.nominal else (range(args.days), args.takes)
     with tempfile.TemporaryDirectory() as folder:
-        count = args.days - (-args.takes // OF_A_PART) + bool(args.real)
-        low, high = args.rates or (0.0, np.inf)
-        parts = progress(streams(args.days, args.takes, args.real), count, "streams")
-        write(([one for one in part if low <= one.rate_hz <= high] for part in parts), Path(folder))
+        count = len(days) - (-takes // OF_A_PART) + bool(args.real)
+        write(progress(streams(days, takes, args.real), count, "streams"), Path(folder))
         here, there = (told_by(root, folder) for root in (Path(), args.before))
         digests = next(here).strip(), next(there).strip()
         events = compared(here, there, args.but)
-    what = f"{args.days * DAY_S / 3600:g} h of days, {args.takes} takes{' and real sessions' if args.real else ''}"
-    what += f", of sensors at {low:g} to {high:g} Hz" if args.rates else ""
+    what = f"{len(days) * DAY_S / 3600:g} h of days, {takes} takes{' and real sessions' if args.real else ''}"
+    what += ", of nominal sensors" if args.nominal else ""
     line = f"{' '.join(digests)} {date.today()} {events} events of {what}{args.but and f', but for {args.but}'}"
     print(line)
     with HELD.open("a") as file:

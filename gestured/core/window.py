@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 
-SAME_RATE = 0.45  # of the model's interval: if a sensor's differs by less, its frames are taken as they are
+# Shares of the model's interval: if a sensor's is longer or shorter by no more, its frames are taken as they are, since
+# averages of a faster sensor's blur taps. A slower one needs the frames that are interpolated.
+LONGER, SHORTER = 0.12, 0.45
 SLACK = 0.25  # of the model's interval: a window is so much longer, since jitter must not decide whether a frame is in
 USED = 0.3  # of the most pressed row or column of a long sensor: rows or columns above that are part of the movement
 RIM = 2.0  # taxel pitches around the movement that are taken in with it, on both sides together
@@ -106,17 +108,17 @@ class Window:
     def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
         """Frames at `rate_hz`, by time stamps: averaged if the sensor is faster, interpolated if it is slower.
 
-        Frames of a sensor that is about as fast as the model are taken as they are, since both blur taps: at 20 Hz a
-        gesture then seems a third slower, which people differ by anyway (`experiments.rates`). `usual` is the sensor's
-        interval in seconds, of all frames of the segment, since those of a tap are too few.
+        At a rate near the model's frames are taken as they are: at 20 Hz a gesture then seems a third slower, which
+        people differ by anyway (`experiments.rates`). `usual` is the sensor's interval in seconds, of all frames of the
+        segment, since those of a tap are too few.
         """
         if len(times) < 2:
             return frames
         step = 1.0 / self.rate_hz
         steps = np.diff(times)
         flat = frames.reshape(len(frames), -1)
-        if abs(usual - step) <= SAME_RATE * step:
-            missing = np.maximum(np.rint(steps / usual).astype(int), 1)
+        if -SHORTER * step <= usual - step <= LONGER * step:
+            missing = np.maximum(np.rint(steps / min(usual, step)).astype(int), 1)
             at = np.concatenate([[0], np.cumsum(missing)])
             if at[-1] + 1 == len(flat):
                 return frames
