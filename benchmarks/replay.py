@@ -17,7 +17,7 @@ from gestured.simulator import Take
 
 SECONDS = 300.0
 REPEATS = 5
-FASTER = 1000.0  # times real time: the speed at which the frames are sent to the daemon
+FASTER = 200.0  # times real time, at which frames are sent to the daemon: it must have served them when it is ended
 
 
 def replay(model: str) -> Row:

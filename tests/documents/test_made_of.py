@@ -114,7 +114,7 @@ def test_code_that_decides_as_other_code_did_makes_no_table_older() -> None:
 
 
 def test_two_checkouts_decide_alike_if_no_event_differs(tmp_path: Path) -> None:
-    assert write(streams(0, 2, None), tmp_path) == 1
+    assert write(streams(range(0), 2, None), tmp_path) == 1
     _, *events = told(tmp_path, "cnn_lstm")
     assert compared(iter(events), iter(events), "") == len(events) > 4
     for wrong in (events[:-1], [*events[:2], "Onset(sensor='sensor0', id=1, onset=0.5)", *events[2:]]):
