@@ -17,7 +17,7 @@ from gestured.simulator import Take
 
 SECONDS = 300.0
 REPEATS = 5
-FASTER = 200.0  # times real time, at which frames are sent to the daemon: it must have served them when it is ended
+FASTER = 200.0  # times real time; a daemon that is ended before it has served all frames gives fewer answers
 
 
 def replay(model: str) -> Row:

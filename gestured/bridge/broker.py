@@ -114,11 +114,11 @@ class Broker:
         who = f" at once: does another bridge have the name gestured-{self._host}? (--host)"
         return f"it closed the connection{who if held_s < LONGEST_S else ''}"
 
-    def largest(self, terms: Any) -> int:
-        """The size in bytes of the largest packet that the broker takes; `terms` are the properties of its CONNACK.
+    def check(self, terms: Any) -> int:
+        """Check the properties of the broker's CONNACK; returns the size in bytes of the largest packet that it takes.
 
-        Raises BridgeError if it takes too little of MQTT. A broker that is sent what it does not take says why and
-        closes the connection, but what it says is lost if packets of ours were on their way.
+        Raises BridgeError if it takes no retained messages, or none with QoS 1. A broker that is sent what it does not
+        take says why and closes the connection, but what it says is lost if packets of ours were on their way.
         """
         if not getattr(terms, "RetainAvailable", 1):
             raise self.refusal(NO_RETAIN)

@@ -64,8 +64,9 @@ class Mqtt:
         self._sent: dict[int, Outgoing] = {}  # by message number: events that the broker has not acknowledged
         self._changed = False  # whether a command has changed what the broker should retain
         self._changes: Iterator[tuple[str, str]] = iter(())  # retained messages to be published
-        self._changing: dict[int, str] = {}  # number -> topic: retained messages that the broker has not acknowledged
-        self._refusals: set[int] = set()  # reason codes of refused messages that were logged
+        # By message number: topics of retained messages that the broker has not acknowledged.
+        self._changing: dict[int, str] = {}
+        self._refusals: set[int] = set()  # reason codes of refused messages, each of which is logged once
         self._farewell = 0  # number of the last message, "offline"
         self._most = 0  # messages that may be in flight, without the last one
         self._largest = ANY_BYTES  # bytes of the largest packet that the broker takes
@@ -147,7 +148,7 @@ class Mqtt:
             return
         self._connected, self._since = True, time.monotonic()
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
-        self._largest = self._broker.largest(terms)
+        self._largest = self._broker.check(terms)
         self._most = max(min(IN_FLIGHT, getattr(terms, "ReceiveMaximum", IN_FLIGHT)) - 1, 1)
         if self._gate is not None:
             self._broker.hear(client, self._commanded)

@@ -66,7 +66,7 @@ class Sensor:
         self.stamper = Stamper(scene.clock_of(name))
         # The classifier and the segment of the last question, and its answers.
         self._asked: tuple[Classifier, Segment, Scores | None, Where] | None = None
-        self._alone: tuple[Classifier, Segment, Scores | None] | None = None  # the same, as if nothing had been before
+        self._alone: tuple[Classifier, Segment, Scores | None] | None = None  # as `_asked`, without the past
         self.shown: Segment | None = None  # the segment that `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
@@ -236,7 +236,7 @@ class Sensor:
         """Why a segment's best gesture, with that score, is less sure than `least`: "context" if its past is why.
 
         To find that out takes a run of the model, on which no answer depends. It takes none if the score is too low,
-        or if it was found out before the answer was due.
+        or if `ask` has found it out already.
         """
         if score < least or segment.before == UNDISTURBED:
             return "confidence"

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 
-# Shares of the model's interval: if a sensor's is longer or shorter by no more, its frames are taken as they are, since
-# averages of a faster sensor's blur taps. A slower one needs the frames that are interpolated.
+# Shares of the model's interval, by which a sensor's interval may be longer or shorter for its frames to be taken as
+# they are: an average over a faster sensor's frames blurs taps. Models have learned to see slower ones interpolated.
 LONGER, SHORTER = 0.12, 0.45
 SLACK = 0.25  # of the model's interval: a window is so much longer, since jitter must not decide whether a frame is in
 USED = 0.3  # of the most pressed row or column of a long sensor: rows or columns above that are part of the movement
@@ -108,9 +108,9 @@ class Window:
     def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
         """Frames at `rate_hz`, by time stamps: averaged if the sensor is faster, interpolated if it is slower.
 
-        At a rate near the model's frames are taken as they are: at 20 Hz a gesture then seems a third slower, which
-        people differ by anyway (`experiments.rates`). `usual` is the sensor's interval in seconds, of all frames of the
-        segment, since those of a tap are too few.
+        At a rate near the model's they are taken as they are. To a model of 15 Hz a gesture at 20 Hz then seems a third
+        slower, and people differ by as much; `experiments.rates` prints what a rate costs. `usual` is the sensor's
+        interval in seconds, of all frames of the segment, since those of a tap are too few.
         """
         if len(times) < 2:
             return frames

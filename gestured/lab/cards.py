@@ -125,7 +125,8 @@ def head(of: str = "set") -> tuple[str, str]:
 def row(title: str, values: Mapping[str, Any]) -> str:
     """The line of one set, of an `Evaluation` as a dictionary."""
     ends = values["intervals"]
-    of = {"right": "gestures", "wrong": "gestures", "lost": "gestures", "rejected": "others"}  # NaN or null without any
+    # What each is a share of; without any of these it is NaN, or null in JSON.
+    of = {"right": "gestures", "wrong": "gestures", "lost": "gestures", "rejected": "others"}
     *shares, rejected = (with_interval(values[n], ends[n]) if values[of[n]] else "-" for n in of)
     before = f"{values['right_before']:.3f}" if values["gestures"] else "-"
     return f"| {title} | {values['gestures']} | {before} | {' | '.join(shares)} | {values['others']} | {rejected} |"

@@ -187,7 +187,7 @@ def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: st
     others = multiprocessing.active_children()
     with ExitStack() as stack:
         with stop_later():  # a process that loses its parent while it starts ends in a traceback
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # which processes inherit; Ctrl-C while they start is no error
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited: Ctrl-C at their start makes no traceback
             pool = stack.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
         workers = [process for process in multiprocessing.active_children() if process not in others]
         made = pool.imap(make, todo)  # with chunks it gives a generator, which has no timeout
