@@ -15,8 +15,6 @@ import time
 from collections.abc import Callable, Sequence
 from itertools import chain
 
-import numpy as np
-
 from gestured.core.hub import Hub
 from gestured.core.owner import Source
 from gestured.daemon.backlog import FLOOD_S, GROUP, GROUP_BYTES, TOGETHER_S, Backlog, Packet
@@ -39,6 +37,7 @@ SPARSE_S = 0.02  # between packets; if they are further apart, the alarm is earl
 STEP_S = 0.05  # by which the wall clock may move against the monotonic one; after a larger step, stamps are not used
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
+UNKNOWN = TIMESTAMP.pack(1 << 62, 0)  # the time of a packet for which the kernel has told none
 ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
 
 
@@ -122,17 +121,17 @@ class Receiver:
         found, stamps, full = self._receive()
         now, wall = self._clocks()
         if abs(wall - self._wall) > STEP_S:
-            stamps = [b""] * len(found)
+            stamps = [UNKNOWN] * len(found)
+        arrivals = self._arrivals(stamps, now)
         much = len(found) > 1 and sum([len(packet) for packet, _ in found]) > GROUP_BYTES
-        late = bool(found) and now - self._arrival(stamps[0], now) >= TOGETHER_S
+        late = bool(found) and now - arrivals[0] >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
-            arrivals = self._arrivals(stamps, now)
             self._put(found, arrivals, now)
             self._count_drops(now)
-            if stamps[-1]:
+            if stamps[-1] is not UNKNOWN:
                 self._empty = arrivals[-1]  # the kernel gives packets in the order in which they came
         elif found:
-            self._take(found, [self._arrival(stamp, now) for stamp in stamps], now)
+            self._take(found, arrivals, now)
         if not full:
             self._empty = began  # the packets of the next read came later, even if we were stopped since
         self._wall = wall
@@ -194,31 +193,26 @@ class Receiver:
         try:
             for _ in range(GROUP):
                 packet, ancillary, _, source = receive(PACKET_BYTES, ANCILLARY_BYTES)
-                found.append((packet, source))
-                stamps.append(ancillary[0][2] if ancillary else b"")
+                found.append((packet, source[:2]))  # one of IPv6 has a flow and a scope, too
+                stamps.append(ancillary[0][2] if ancillary else UNKNOWN)
         except (BlockingIOError, InterruptedError):
             return found, stamps, False
         except (OSError, MemoryError) as error:  # an error that is about no packet here; the socket can still be read
             self._desk.drop("socket_error", error=str(error))
         return found, stamps, True
 
-    def _arrival(self, stamp: bytes, now: float) -> float:
-        """When a packet came, in s of the monotonic clock: not before the socket was empty, and not after `now`."""
-        if len(stamp) != TIMESTAMP.size:
-            return now
-        seconds, nanoseconds = TIMESTAMP.unpack(stamp)
-        came: float = seconds + nanoseconds / 1e9 - self._wall
-        return min(now, max(self._empty, came))
-
     def _arrivals(self, stamps: list[bytes], now: float) -> list[float]:
-        """When the packets with these stamps came, by the rule of `_arrival`; the times never decrease."""
-        joined = b"".join(stamps)
-        if len(joined) == TIMESTAMP.size * len(stamps):  # each packet has a stamp
-            seconds, nanoseconds = np.frombuffer(joined, np.int64).reshape(-1, 2).T
-            came = np.minimum(now, np.maximum(self._empty, seconds + nanoseconds / 1e9 - self._wall))
-        else:
-            came = np.array([self._arrival(stamp, now) for stamp in stamps])
-        arrivals: list[float] = np.maximum.accumulate(came).tolist()
+        """When packets came by these times of the kernel, in s of the monotonic clock; the arrivals never decrease.
+
+        No packet came before the socket was empty, nor after `now`, which counts for times that are unknown.
+        """
+        arrivals = list[float]()
+        last, wall = self._empty, self._wall
+        for seconds, nanoseconds in TIMESTAMP.iter_unpack(b"".join(stamps)):
+            came = seconds + nanoseconds / 1e9 - wall
+            if came > last:
+                last = came if came < now else now
+            arrivals.append(last)
         return arrivals
 
     def _work(self, now: float) -> None:

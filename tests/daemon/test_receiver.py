@@ -144,7 +144,8 @@ class Machine:
             raise BlockingIOError
         t, packet, source = self._buffer.popleft()
         self._size -= len(packet)
-        return packet, [(0, 0, TIMESTAMP.pack(int(t), round(t % 1 * 1e9)))], 0, source
+        address: Any = (*source, 0, 0) if ":" in source[0] else source  # one of IPv6 has a flow and a scope, too
+        return packet, [(0, 0, TIMESTAMP.pack(int(t), round(t % 1 * 1e9)))], 0, address
 
     def getsockopt(self, *_: int) -> bytes:
         return struct.pack("@9I", *[0] * 8, self._dropped)
@@ -287,7 +288,7 @@ def test_what_the_way_held_up_is_taken_at_once_and_others_do_not_wait_for_it(apa
 def test_while_owners_send_full_packets_nobody_else_loses_one(ports: int, cost_s: float, burst: int) -> None:
     """They come one at a time, so that a read finds few, or many at once; each costs as much as several turns."""
     good = sensors(4, 145)
-    full = [(n // burst * burst / 600, bytes(55_000), ("10.0.0.9", n % ports)) for n in range(600 * 10)]
+    full = [(n // burst * burst / 600, bytes(55_000), ("fd00::9", n % ports)) for n in range(600 * 10)]
     machine = Machine([*good, *full], lambda packet: cost_s if len(packet) > 1000 else 1e-4)
     run(machine, 10.0)
     heard = Counter(int(packet) for packet, (host, _) in machine.served if host == "10.0.0.1")
