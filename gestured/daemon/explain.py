@@ -44,8 +44,9 @@ def _models(settings: Settings, ladder: Ladder) -> Said:
     yield LOADS, f"gestures {', '.join(used)}"
     if unused := [name for name in ladder.gestures if name not in used]:
         yield LEAVES, f"gestures {', '.join(unused)}: their scores are dropped"
-    for rung in ladder.rungs[1:]:
-        yield FALLBACKS, f"{rung.name}{'' if rung.model is None else ', in use'}"
+    for n, rung in enumerate(ladder.rungs[1:], 1):
+        if rung.refused is None:
+            yield FALLBACKS, f"{rung.name}{', in use' if n == ladder.rung else ''}"
 
 
 def _own(settings: Settings, ladder: Ladder) -> Said:

@@ -30,9 +30,9 @@ class Ladder:
     """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
 
     A rung that raises or gives scores that are not finite is put aside for RETRY_S of `clock`, and then tried again.
-    So is a rung that took more than `slow_s` seconds SLOW_RUNS times in a row. A rung that cannot be opened is put
-    aside for good. If no other rung can answer, those that are aside are tried before giving up. An answer of any rung
-    but the first is `degraded`. The rung that answers also compares gestures of the user's own.
+    So is a rung that took more than `slow_s` seconds SLOW_RUNS times in a row. A rung that cannot be opened, or knows
+    other gestures, is put aside for good. If no other rung can answer, those that are aside are tried before giving up.
+    An answer of any rung but the first is `degraded`. The rung that answers also compares gestures of the user's own.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Ladder:
         clock: Callable[[], float] = time.perf_counter,
         report: Callable[[str], None] | None = None,
     ) -> None:
-        """Open the first rung that can be opened. Raises ModelError if none can, or if one knows other gestures.
+        """Open the first rung that can be opened. Raises ModelError if none can.
 
         If `slow_s` is infinite, this ladder does not make the process end long runs (`limit.hurry`). `report` is
         called with a sentence that says what happened to a rung.
@@ -109,8 +109,7 @@ class Ladder:
         for rung in ready + aside:
             try:
                 model = rung.open()
-                if model.gestures != self.gestures:
-                    raise ModelError(f"{rung.name}: knows other gestures than {self.name}")
+                self._require_same(rung, model.gestures)
                 start = self._clock()
                 scores = model.classify(segment)
                 took = self._clock() - start
@@ -190,17 +189,18 @@ class Ladder:
         raise ModelError("; ".join(reason for _, reason in failed))
 
     def _check_gestures(self, rung: Rung) -> None:
-        """Put a fallback aside that cannot be opened. Raises ModelError if it knows other gestures."""
+        """Put a fallback aside that cannot be opened, or that knows other gestures."""
         try:
-            gestures = rung.gestures()
+            self._require_same(rung, rung.gestures())
         except ModelError as error:
             if rung.aside_until == -math.inf:
                 self._put_aside(rung, str(error))
-            return
+
+    def _require_same(self, rung: Rung, gestures: Sequence[str]) -> None:
         if gestures != self.gestures:
-            raise ModelError(
-                f"{rung.name}: cannot stand in for {self._active.name}, expected the same gestures in the "
-                f"same order ({', '.join(self.gestures)}), found {', '.join(gestures)}"
+            rung.refuse(
+                f"{rung.name}: cannot stand in for {self._active.name}, expected the same gestures in the same order "
+                f"({', '.join(self.gestures)}), found {', '.join(gestures)}"
             )
 
     def _put_aside(self, rung: Rung, reason: str) -> None:

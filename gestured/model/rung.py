@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from gestured.core.errors import ModelError
 from gestured.model.model import Model
@@ -38,6 +38,11 @@ class Rung:
         if self.model is None and shipped_name(self.source) is not None:
             return self._once(lambda: shipped_gestures(self.source))
         return self.open().gestures
+
+    def refuse(self, reason: str) -> NoReturn:
+        """Raise ModelError with the reason, now and whenever the model is asked for."""
+        self.model, self.refused = None, ModelError(reason)
+        raise self.refused
 
     def _once(self, look: Callable[[], T]) -> T:
         if self.refused is not None:

@@ -42,6 +42,16 @@ def test_the_file_of_own_gestures_is_said_and_why_the_daemon_goes_on_without_one
     assert "own gestures: there is no file for own gestures, since there is no home" in explained()
 
 
+def test_a_fallback_is_in_use_only_if_it_answers_and_none_if_it_cannot(model: Path, tmp_path: Path) -> None:
+    other = tiny_model.make(tmp_path / "other.onnx", gestures=tiny_model.GESTURES[::-1])
+    mine = tiny_model.make(tmp_path / "mine.onnx")
+    flags = ("--model", mine, "--fallback", other, "--fallback", model)
+    assert "falls back on:\n  tiny\n\n" in (said := explain(*settings_of(*flags)))
+    assert "  other could not be used: other: cannot stand in for mine, expected the same gestures" in said
+    mine.write_bytes(b"damaged")
+    assert "falls back on:\n  other, in use\n\n" in explain(*settings_of(*flags))
+
+
 def test_what_each_strictness_costs_is_said_for_each_rung_and_what_holds_before_it(model: Path, tmp_path: Path) -> None:
     points = operating_points(tiny_model.GESTURES)
     path = tiny_model.make(tmp_path / "mine.onnx", operating_points=points)
