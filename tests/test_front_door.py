@@ -148,7 +148,6 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"sensor": 5}, "sensor: expected 1 to 64 of .* found 5"),
         ({"zones": [("seat", (0, 0, 1, 1))]}, "zones: expected four numbers for each name, found .*seat"),
         ({"arming": {"by": "one_tap", "seconds": 10**400}}, "too large"),
-        ({"own_gestures": "none.json"}, r"none\.json: cannot be read: No such file"),
         ({"own_gestures": "n" * 300}, "nnn: cannot be read: File name too long"),
     ],
 )
@@ -369,6 +368,15 @@ def test_own_gestures_are_recognised_from_their_file(tmp_path: Path, model: Path
     (tmp_path / "own.json").write_text("{}")
     with pytest.raises(gestured.GesturedError, match=r"own\.json: is no file of own gestures"):
         gestured.open(able, own_gestures=tmp_path / "own.json")
+
+
+def test_a_file_of_own_gestures_that_is_missing_is_as_empty_as_to_a_daemon_and_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    able = tiny_model.make(tmp_path / "able.onnx", own=tiny_model.own())
+    recognizer = gestured.open(able, own_gestures=tmp_path / "none.json")
+    assert recognizer.gestures == tiny_model.GESTURES
+    assert caplog.messages == [f"{tmp_path / 'none.json'}: no such file, so there are no gestures of your own yet"]
 
 
 @pytest.mark.parametrize("lost", [float("nan"), -1, 0.5, "1", None])

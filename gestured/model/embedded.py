@@ -1,6 +1,5 @@
 """The recogniser of one sensor in the caller's own process, which `gestured.open` returns."""
 
-import errno
 import logging
 import math
 import operator
@@ -215,8 +214,8 @@ def _own(ladder: Ladder, path: Path) -> Own:
     found = own_file.load(path)
     if found.fault is not None:
         raise OwnFileError(found.fault)
-    if not found.sha256:  # a daemon makes a file that is missing; a program that names one expects its gestures
-        raise OwnFileError(f"{path}: cannot be read: {os.strerror(errno.ENOENT)}")
+    if not found.sha256:  # a daemon makes the file at the first enrolment
+        ladder.report(f"{path}: no such file, so there are no gestures of your own yet")
     if ladder.model.space is None and not ladder.degraded:
         raise SettingsError(f"own_gestures: {ladder.name} has no embedding, expected a model that was made for them")
     return ladder.compared(found.gestures)
