@@ -138,6 +138,13 @@ def test_signals_that_its_starter_had_blocked_reach_it(start) -> None:
     assert daemon.stop() == 0
 
 
+@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGUSR2])
+def test_a_signal_that_asks_other_daemons_for_something_ends_nothing(start, number: int) -> None:
+    daemon = start()
+    daemon.signal(number)
+    assert daemon.ask("status")["ready"]["ready"]
+
+
 def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s", python=["-v"])
     with daemon.stderr_path.open() as log:
