@@ -1,5 +1,6 @@
 """What is installed: the wheel's contents, its programs, and that it runs without the extras."""
 
+import ast
 import importlib.util
 import os
 import shlex
@@ -109,6 +110,14 @@ def test_the_wheel_holds_models_types_and_licences_and_nothing_else(installed: P
     assert "Apache License" in (information / "licenses" / "LICENSE").read_text()
     assert "CapFingerId" in (information / "licenses" / "NOTICE").read_text()
     assert {path.name for path in installed.iterdir()} == {"gestured", "gestured_models", information.name}
+
+
+def test_no_message_names_a_document_since_a_wheel_brings_none():
+    files = [path for path in (ROOT / "gestured").rglob("*.py") if "lab" not in path.parts]
+    nodes = [node for path in files for node in ast.walk(ast.parse(path.read_text()))]
+    docstrings = {node.value for node in nodes if isinstance(node, ast.Expr)}
+    texts = [node.value for node in nodes if isinstance(node, ast.Constant) and node not in docstrings]
+    assert texts and [text for text in texts if isinstance(text, str) and ".md" in text] == []
 
 
 def test_everything_but_the_lab_imports_without_the_extras(installed: Path, tmp_path: Path):

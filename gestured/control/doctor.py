@@ -150,7 +150,7 @@ def _bridges() -> Iterator[Finding]:
         if not unit.get("Id"):
             continue
         said = unit.get("StatusText") or unit.get("ActiveState", "")
-        remedy = f"journalctl --unit {unit['Id']} --lines 20 says why; docs/connect.md what it needs"
+        remedy = f"journalctl --unit {unit['Id']} --lines 20 says why"
         if unit.get("ActiveState") != "active":
             yield Finding("bad", f"{unit['Id']} is {unit.get('ActiveState')}", remedy)
         elif said.startswith("connected"):

@@ -29,7 +29,7 @@ class Finding:
 DROPS = {  # by reason: what the dropped packets did, and what to do
     "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
     "size": "had another number of taxels than the grid: gesturectl sniff proposes one",
-    "types": "held neither numbers nor one blob: wire.md says what a frame is, gesturectl sniff what arrives",
+    "types": "held neither numbers nor one blob: gesturectl sniff shows what arrives",
     "not_allowed": "came from a source that is not under allow",
     "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
     "too_many_sensors": "were of more sensors than max_sensors: look for a sender that changes its name",
@@ -109,7 +109,7 @@ def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
         yield Finding("ok", f"the daemon serves, {status['state']}, pid {status['pid']}")
     if status["loop_lag_s"] > SLOW_S:
         late = f"the daemon runs {1000 * status['loop_lag_s']:.0f} ms late"
-        remedy = "the machine is too busy, or too many sensors send: give gestured a processor, or see docs/fleet.md"
+        remedy = "the machine is too busy, or too many sensors send: give gestured a processor, or run several daemons"
         yield Finding("warn", late, remedy)
     if status["internal_errors"]:
         bugs = f"{status['internal_errors']} bugs were caught"
