@@ -120,6 +120,11 @@ def test_no_message_names_a_document_since_a_wheel_brings_none():
     assert texts and [text for text in texts if isinstance(text, str) and ".md" in text] == []
 
 
+def test_the_page_on_installing_names_each_extra_but_those_for_changing_the_code():
+    extras, page = PROJECT["project"]["optional-dependencies"], (ROOT / "docs/install.md").read_text()
+    assert [extra for extra in extras if f"`[{extra}]`" not in page] == ["dev", "fuzz"]
+
+
 def test_everything_but_the_lab_imports_without_the_extras(installed: Path, tmp_path: Path):
     done = python_without(EXTRAS, ALL_BUT_LAB, installed, tmp_path)
     assert done.returncode == 0, done.stderr
