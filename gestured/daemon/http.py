@@ -7,6 +7,7 @@ This module is loaded only if `metrics` is set.
 
 import asyncio
 import json
+import re
 import socket
 import threading
 import time
@@ -112,7 +113,11 @@ class HttpThread:
         self._open[writer] = None
         try:
             async with asyncio.timeout(DEADLINE_S):
-                head = await reader.readuntil(b"\r\n\r\n")
+                head = b""
+                while not head.endswith((b"\n\r\n", b"\n\n")):  # RFC 9112, 2.2: a line may end without \r
+                    head += await reader.readuntil(b"\n")
+                    if len(head) > REQUEST_BYTES:
+                        return
                 writer.write(self._answer(head))
                 await writer.drain()
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError):
@@ -122,13 +127,14 @@ class HttpThread:
             writer.transport.abort() if writer.transport.get_write_buffer_size() else writer.close()
 
     def _answer(self, head: bytes) -> bytes:
-        words = head.split(b"\r\n", 1)[0].split()
+        words = head.strip().split(b"\n", 1)[0].split()
         if len(words) != 3 or not words[2].startswith(b"HTTP/1."):
             status, kind, body = as_json(400, {"error": "not an HTTP/1 request"})
         elif words[0] not in (b"GET", b"HEAD"):
             status, kind, body = as_json(405, {"error": "only GET and HEAD"})
         else:
-            route = self._routes.get(words[1].split(b"?", 1)[0].decode("latin-1"))
+            path = re.sub(rb"^https?://[^/]*", b"", words[1].split(b"?", 1)[0], flags=re.IGNORECASE)
+            route = self._routes.get(path.decode("latin-1"))
             try:
                 status, kind, body = (
                     route() if route else as_json(404, {"error": "not found", "paths": list(self._routes)})

@@ -223,7 +223,15 @@ def test_http_answers_whatever_it_is_asked(web) -> None:
         (b"rubbish\r\n\r\n", b"400"), (b"GET /broken HTTP/1.1\r\n\r\n", b"500"),
     ):  # fmt: skip
         assert ask(address, request).split()[1] == code
-    assert ask(address, b"x" * 20_000) == b""
+    assert ask(address, b"x" * 20_000) == ask(address, b"GET /ok HTTP/1.1\r\n" + b"a: b\r\n" * 2_000) == b""
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [b"GET /ok HTTP/1.0\n\n", b"\r\nGET /ok HTTP/1.1\nHost: a\r\n\n", b"GET HTTP://a:1/ok?x HTTP/1.1\r\n\r\n"],
+)
+def test_http_takes_bare_line_feeds_an_empty_line_before_and_a_whole_address(web, request_: bytes) -> None:
+    assert ask(web[0], request_).startswith(b"HTTP/1.1 200 OK")
 
 
 def slow(address: tuple[str, int], count: int) -> list[socket.socket]:
