@@ -66,7 +66,7 @@ STATES = {
 
 def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iterator[Finding]:
     """The findings in the daemon's answer to `status`; `proposed` has the lines of `propose` if packets do not fit."""
-    for look in (_daemon, _ports, _active_model):
+    for look in (_daemon, _ports, _models):
         yield from look(status)
     if proposed:
         what = "what arrives does not fit the settings, and is dropped"
@@ -130,11 +130,13 @@ def _ports(status: dict[str, Any]) -> Iterator[Finding]:
         yield Finding("warn", what, "name the senders with --allow, and keep the network private")
 
 
-def _active_model(status: dict[str, Any]) -> Iterator[Finding]:
+def _models(status: dict[str, Any]) -> Iterator[Finding]:
     model = status["model"]
     if model["degraded"]:
         yield Finding("bad", f"{model['active']} stands in for {model['asked']}", "gesturectl check says what is wrong")
-    yield model_finding(status["model"]["file"], model["sha256"])
+    for reason in model.get("refused", ()):  # an older daemon does not tell
+        yield Finding("warn", reason, "mend the file or name another one, then gesturectl reload")
+    yield model_finding(model["file"], model["sha256"])
 
 
 def _input(status: dict[str, Any]) -> Iterator[Finding]:

@@ -16,6 +16,7 @@ from gestured.control.findings import BUFFER_BYTES
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
+from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, floats
 from tests.sockets import FakeDaemon, meanwhile, sending
 
@@ -160,6 +161,14 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon, mon
     assert "[addresses]" in dropped["address"] and "grid" in dropped["size"]
     assert any(f["level"] == "ok" and "passes its self-test" in f["what"] for f in findings)
     assert all(f["remedy"] for f in findings if f["level"] != "ok" and "limit" not in f["what"])
+
+
+def test_doctor_says_why_a_fallback_cannot_stand_in(run, serve, tmp_path: Path) -> None:
+    other = tiny_model.make(tmp_path / "other.onnx", gestures=tiny_model.GESTURES[::-1])
+    control = serve("--fallback", other, "--fallback", tmp_path / "none.onnx").ready["control"]
+    said = run("doctor", "--control", control)[1]
+    assert "warn    other: cannot stand in for tiny, expected the same gestures in the same order (one_tap" in said
+    assert f"warn    {tmp_path}/none.onnx: cannot be opened: No such file or directory\n" in said
 
 
 def test_doctor_without_any_daemon_asks_whether_it_runs(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
