@@ -44,12 +44,16 @@ class Keeper:
     def hold(self) -> None:
         """Lock the file for this daemon. Raises OwnFileError, which names the daemon that holds it, or the fault.
 
-        A lock that was deleted meanwhile, perhaps with its folder, is made anew.
+        A lock that was deleted meanwhile, perhaps with its folder, is made anew. A link is refused: a write would
+        replace it, and what was forgotten would stay in the file itself.
         """
         if self.path is None:
             raise OwnFileError(own_file.NO_FILE)
         place = self.path.with_name(f".{self.path.name}.lock")
         try:
+            if os.path.islink(self.path):
+                target = os.path.realpath(self.path)
+                raise OwnFileError(f"{self.path}: is a link, expected the file itself, {target}; {own_file.REMEDY}")
             if self._lock is not None and os.path.exists(place):
                 return
             self.close()

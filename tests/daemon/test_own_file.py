@@ -75,6 +75,19 @@ def test_what_somebody_else_has_changed_meanwhile_is_read_before_it_is_written(t
     assert path.read_text() == "no JSON"
 
 
+def test_a_link_to_the_file_is_read_but_not_replaced_since_the_file_itself_would_stay_as_it_was(tmp_path: Path) -> None:
+    path, link = tmp_path / "own.json", tmp_path / "link.json"
+    own_file.write(path, {"slash": (EXAMPLE,)}, "")
+    keeper = Keeper(link)
+    keeper.hold()
+    link.symlink_to(path)
+    keeper.read()
+    assert keeper.found.gestures.keys() == {"slash"}
+    with pytest.raises(OwnFileError, match=f"link.json: is a link, expected the file itself, {path}; set"):
+        keeper.change(lambda found: {}, "")
+    assert link.is_symlink() and own_file.load(path).gestures.keys() == {"slash"}
+
+
 @pytest.mark.parametrize(
     ("environ", "expected"),
     [
