@@ -62,9 +62,6 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
 
     With `insist` a fallback is refused, since at a reload the model that already runs is better.
     """
-    for one in settings.publish:
-        if one.scheme == TUIO and not settings.touch:
-            raise SettingsError(f"publish = {one}: it tells where fingers are, expected `touch = true` as well")
     early: list[str] = []  # sentences that are logged only if opening succeeds, since else the error says them
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:
@@ -73,6 +70,18 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     for sentence in early:
         ladder.report(sentence)
     ladder.report_missing_points((settings.strictness, *(own.strictness for own in settings.sensors.values())))
+    try:
+        _check(settings, ladder)
+    except SettingsError as error:
+        raise SettingsError(settings.with_source(str(error))) from error
+    return ladder
+
+
+def _check(settings: Settings, ladder: Ladder) -> None:
+    """Check settings that depend on others, or on the models. Raises SettingsError, which begins with a setting."""
+    for one in settings.publish:
+        if one.scheme == TUIO and not settings.touch:
+            raise SettingsError(f"publish = {one}: it tells where fingers are, expected `touch = true` as well")
     ladder.gestures_in_use(settings.gestures)
     named: dict[str, Iterable[str]] = {"gestures": settings.per_gesture}
     for name, sensor in settings.sensors.items():
@@ -80,7 +89,6 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     for field, names in named.items():
         ladder.require_gestures((name for name in names if not _may_be_own(name, settings, ladder)), field)
     _require_arming(settings, ladder)
-    return ladder
 
 
 def _require_arming(settings: Settings, ladder: Ladder) -> None:

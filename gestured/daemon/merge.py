@@ -135,7 +135,9 @@ def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple
         merged |= values
         sources |= dict.fromkeys(values, source)
     try:
-        return Settings.model_validate(merged, context={*environment, *flags}), sources
+        settings = Settings.model_validate(merged, context={*environment, *flags})
     except ValidationError as error:
         problems = error.errors(include_url=False, include_context=False)
         raise SettingsError("; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))) from error
+    settings._sources = sources
+    return settings, sources

@@ -1,9 +1,10 @@
 """The settings. Every key is described here and nowhere else, since help and documents are made from this module."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from gestured.core.address import Address
 from gestured.core.listening import LONGEST_S, Arming
@@ -186,6 +187,13 @@ class Settings(Part):
     addresses: AddressSettings = setting(AddressSettings(), "table `[addresses]`, in the file only")
     arming: ArmingSettings | None = setting(None, "table `[arming]`, in the file only")
     gate: GatesSettings = setting(GatesSettings(), "table `[gates]`, in the file only")
+    _sources: Mapping[str, str] = PrivateAttr({})  # of each key that was set
+
+    def with_source(self, mistake: str) -> str:
+        """A sentence that begins with the place of a setting, and before it the source of that setting."""
+        title = re.split(r"\W", mistake, maxsplit=1)[0]
+        sources = [self._sources[key] for key in self._sources if TITLES.get(key, key) == title]
+        return f"{' or '.join(dict.fromkeys(sources))}: {mistake}" if sources else mistake
 
 
 TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # settings that are tables, in the file only

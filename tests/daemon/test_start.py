@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from gestured.core.errors import SettingsError
+from gestured.daemon.asked import open_ladder
 from gestured.daemon.bound import bind_all
 from gestured.daemon.explain import explain
 from gestured.daemon.sockets import AddressError, UnixListener
@@ -298,8 +299,18 @@ def test_settings_that_are_not_valid_end_the_program(model: Path, tmp_path: Path
 def test_gestures_that_the_model_does_not_know(model: Path, tmp_path: Path, text: str, wrong: str) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(text)
-    with pytest.raises(SettingsError, match=f"^{wrong} is no gesture of tiny, expected any of one_tap"):
+    with pytest.raises(SettingsError, match=f"^{config}: {wrong} is no gesture of tiny, expected any of one_tap"):
         explain(*settings_of("--model", model, "--config", config))
+
+
+def test_what_the_model_does_not_know_is_said_with_its_source_as_other_mistakes(model: Path, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("[gestures.one_tap]\nthreshold = 0.5\n[arming]\nby = 'wink'")
+    flags = ("--model", model, "--config", config)
+    with pytest.raises(SettingsError, match="^.*/gestured.toml or environment: gestures: 'wink' is no gesture of tiny"):
+        open_ladder(settings_of(*flags, env={"GESTURED_GESTURES": "wink"})[0])
+    with pytest.raises(SettingsError, match="^.*/gestured.toml: arming.by = 'wink': is no gesture in use"):
+        open_ladder(settings_of(*flags, "--own-gestures", tmp_path / "none.json")[0])
 
 
 @pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
