@@ -190,6 +190,17 @@ def test_the_daemons_state_is_made_of_its_sensors(sensors: dict[str, str], impai
     assert overall(sensors, impaired=impaired) == state
 
 
+def test_who_takes_the_processor_while_the_clocks_are_read_does_not_change_an_events_times(model, monkeypatch) -> None:
+    parts, epochs, late_s = Parts(model), list[float](), iter([0.0, 0.4, 0.4, 0.4])
+    parts.desk.sinks = (SimpleNamespace(publish=lambda event, epoch, test: epochs.append(epoch)),)
+    clocks = SimpleNamespace(time=lambda: 1000.0, monotonic=lambda: 10.0 + next(late_s, 0.4))
+    monkeypatch.setattr("gestured.daemon.desk.time", clocks)
+    parts.desk.publish(Gate("arm", None, (), None, 0.0))
+    late_s = iter([0.4, 0.4, 0.0])
+    parts.desk.publish(Gate("arm", None, (), None, 0.0))
+    assert epochs == [990.0, 990.0]
+
+
 @pytest.fixture
 def web() -> "Iterator[tuple[tuple[str, int], HttpThread]]":
     sock = socket.create_server(("127.0.0.1", 0))
