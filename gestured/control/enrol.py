@@ -8,7 +8,7 @@ from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.client.values import number, sensor_name
 from gestured.control.address import add_sockets, connect
-from gestured.core.own import EXAMPLES, is_name
+from gestured.core.own import A_NAME, EXAMPLES, is_name
 
 USUAL = 3
 
@@ -64,5 +64,5 @@ def _words(line: dict[str, Any], args: argparse.Namespace) -> str:
 
 def _name(text: str) -> str:
     if not is_name(text):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a-z, then a-z, 0-9 and _, at most 32, and not `use`")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {A_NAME}")
     return text

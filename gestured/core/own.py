@@ -20,6 +20,7 @@ from gestured.core.window import LEAST_PEAK, Window
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
 RESERVED = ("use", "unknown", "none")  # words that configuration, answers and recordings use
+A_NAME = f"a-z, then a-z, 0-9 and _, at most {LONGEST_NAME}, and none of {', '.join(RESERVED)}"  # as `is_name` has it
 MOST = 20  # the most gestures of the user's own
 EXAMPLES = 5  # the most examples of one gesture
 MOST_FRAMES = 200  # the most of an example; the longest contact takes some 80 at 15 Hz
@@ -104,7 +105,7 @@ def from_dict(told: object) -> Examples:
     found: dict[str, tuple[Example, ...]] = {}
     for name, examples in told.items():
         if not is_name(name):
-            raise ValueError(f"gestures: {name[:40]!r} is no name of a gesture, expected at most 32 of a-z, 0-9, _")
+            raise ValueError(f"gestures: {name[:40]!r} is no name of a gesture, expected {A_NAME}")
         if not isinstance(examples, list) or not 1 <= len(examples) <= EXAMPLES:
             raise ValueError(f"gestures.{name}: expected a list of 1 to {EXAMPLES} examples")
         found[name] = tuple(_example(one, f"gestures.{name}[{k}]") for k, one in enumerate(examples))

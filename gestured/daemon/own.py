@@ -11,7 +11,7 @@ from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Unknown
 from gestured.core.facts import Decided, Fact
 from gestured.core.messages import json_line
-from gestured.core.own import EXAMPLES, MOST, Examples, is_name
+from gestured.core.own import A_NAME, EXAMPLES, MOST, Examples, is_name
 from gestured.daemon.keeper import Keeper
 from gestured.daemon.log import log
 from gestured.daemon.request import Connection, Refusal
@@ -211,7 +211,7 @@ class OwnGestures:
     def _check(self, name: str, gestures: Examples) -> None:
         """Raises Refusal for a name that cannot be enrolled beside these gestures."""
         if not is_name(name):
-            raise Refusal(f"{name!r} is no gesture's name: expected a-z, then a-z, 0-9, _, 32 at most, not `use`")
+            raise Refusal(f"{name!r} is no gesture's name: expected {A_NAME}")
         if name in self._ladder.gestures:
             raise Refusal(f"{name!r} is a gesture of {self._ladder.name}; choose another name")
         if name in gestures:

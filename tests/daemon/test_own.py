@@ -198,6 +198,7 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(daemon: Daemon) ->
     for name, examples, words in (
         ("swipe_left", 2, "is a gesture of tiny"),
         ("Slash", 2, "is no gesture's name"),
+        ("unknown", 2, "'unknown' is no gesture's name: expected .*, and none of use, unknown, none"),
         ("slash", 6, "expected 1 to 5 examples, found 6"),
     ):
         with pytest.raises(Refused, match=words):
