@@ -139,6 +139,7 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"arming": {"by": "one_tap", "seconds": "5"}}, "arming.seconds: expected a number of seconds, found '5'"),
         ({"zones": False}, "zones: expected four numbers for each name, found False"),
         ({"zones": {5: (0, 0, 1, 1)}}, "zones: expected a text as the name of each, found 5"),
+        ({"zones": {"a": {"at": (0, 0, 1, 1), "gestures": ["x"]}}}, r"^zones\.a\.gestures: 'x' is no gesture"),
         ({"zones": {("a",): (0, 0, 1, 1)}}, r"zones: expected a text as the name of each, found \('a',\)"),
         ({"thresholds": {"one_tap": True}}, "thresholds: one_tap: expected 0 to 1, found True"),
         ({"thresholds": {"wave": 0.5}}, "thresholds: 'wave' is no gesture of cnn_lstm, expected any of .*one_tap"),
@@ -376,7 +377,12 @@ def test_a_file_of_own_gestures_that_is_missing_is_as_empty_as_to_a_daemon_and_s
     able = tiny_model.make(tmp_path / "able.onnx", own=tiny_model.own())
     recognizer = gestured.open(able, own_gestures=tmp_path / "none.json")
     assert recognizer.gestures == tiny_model.GESTURES
-    assert caplog.messages == [f"{tmp_path / 'none.json'}: no such file, so there are no gestures of your own yet"]
+    settings = {"thresholds": {"slash": 0.5}, "zones": {"low": {"at": (0, 0, 1, 0.5), "gestures": ["slash"]}}}
+    gestured.open(able, own_gestures=tmp_path / "none.json", **settings)  # it may be enrolled before the next start
+    for wrong in ({}, {"own_gestures": tmp_path / "none.json", "thresholds": {"swip_left": 0.5}}):
+        with pytest.raises(gestured.GesturedError, match="thresholds: 'sw?[a-z_]+' is no gesture of able"):
+            gestured.open(able, **(settings | wrong))
+    assert caplog.messages[0] == f"{tmp_path / 'none.json'}: no such file, so there are no gestures of your own yet"
 
 
 @pytest.mark.parametrize("lost", [float("nan"), -1, 0.5, "1", None])

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gestured.core.errors import ModelError, SettingsError
-from gestured.core.own import is_name
 from gestured.core.scene import Scene
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
@@ -17,8 +16,6 @@ from gestured.daemon.sinks import OscSink, UdpOut
 from gestured.daemon.tuio import TUIO, TuioSink
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, ladder_for, require_arming
-
-SLIP = 0.8  # difflib's ratio from which a name counts as a misspelt gesture of the model
 
 
 class Output(NamedTuple):
@@ -86,8 +83,9 @@ def _check(settings: Settings, ladder: Ladder) -> None:
     named: dict[str, Iterable[str]] = {"gestures": settings.per_gesture}
     for name, sensor in settings.sensors.items():
         named |= {f"sensors.{name}.zones.{zone}.gestures": one.gestures or () for zone, one in sensor.zones.items()}
+    keeps = own_file.where(settings.own_gestures, os.environ) is not None  # so that a gesture may be enrolled
     for field, names in named.items():
-        ladder.require_gestures((name for name in names if not _may_be_own(name, settings, ladder)), field)
+        ladder.require_gestures((name for name in names if not (keeps and ladder.may_be_own(name))), field)
     _require_arming(settings, ladder)
 
 
@@ -98,14 +96,6 @@ def _require_arming(settings: Settings, ladder: Ladder) -> None:
         own = own_file.load(own_file.where(settings.own_gestures, os.environ))
         if own.fault is None:
             require_arming(scene, (*scene.gestures, *own.gestures))
-
-
-def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
-    """Whether a name in the settings may be that of a gesture of the user's own, which may be enrolled at any time."""
-    from difflib import get_close_matches
-
-    possible = name not in ladder.gestures and own_file.where(settings.own_gestures, os.environ) is not None
-    return possible and is_name(name) and not get_close_matches(name, ladder.gestures, 1, SLIP)
 
 
 def scene_of(settings: Settings, ladder: Ladder) -> Scene:

@@ -195,13 +195,15 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             touch=touch,
             strictness=strictness,
             arming=Arming.of(arming),
-            thresholds=_thresholds(ladder, thresholds or {}),
+            thresholds=_thresholds(thresholds or {}),
         )
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingsError(str(error)) from None
     ladder.report_missing_points((strictness,))
-    named = (name for zone in scene.setup(sensor).zones.values() for name in zone.gestures or ())
-    ladder.require_gestures(name for name in named if name not in ladder.own.gestures)
+    named = {f"zones.{name}.gestures": zone.gestures or () for name, zone in scene.setup(sensor).zones.items()}
+    for field, names in ({"thresholds": thresholds or ()} | named).items():
+        unknown = [name for name in names if name not in ladder.own.gestures]
+        ladder.require_gestures((name for name in unknown if not (own_gestures and ladder.may_be_own(name))), field)
     require_arming(scene, (*used, *ladder.own.gestures))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
@@ -221,9 +223,8 @@ def _own(ladder: Ladder, path: Path) -> Own:
     return ladder.compared(found.gestures)
 
 
-def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:
-    """Confidences by name, of the model's gestures and the user's own."""
-    ladder.require_gestures((name for name in told if name not in ladder.own.gestures), "thresholds")
+def _thresholds(told: Mapping[str, float]) -> Mapping[str, float]:
+    """Confidences by name."""
     for name, least in told.items():
         if isinstance(least, bool) or not isinstance(least, Real) or not 0 <= least <= 1:
             raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")

@@ -12,7 +12,7 @@ import numpy as np
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
-from gestured.core.own import Examples
+from gestured.core.own import Examples, is_name
 from gestured.core.points import USUAL, Certainty
 from gestured.core.scene import Scene
 from gestured.model.limit import hurry
@@ -23,6 +23,7 @@ from gestured.model.shipped import LADDER, shipped, shipped_name
 
 SLOW_S = 0.05  # a run that takes longer counts as slow, since it delays an answer; some milliseconds are usual
 SLOW_RUNS = 3  # so many slow runs in a row put a rung aside; one may be the fault of another program
+SLIP = 0.8  # difflib's ratio from which a name counts as a misspelt gesture of the model
 RETRY_S = 30.0  # a rung is put aside for so long, since trying it again may delay another answer
 
 
@@ -163,6 +164,12 @@ class Ladder:
             if name not in self.gestures:
                 known = ", ".join(self.gestures)
                 raise SettingsError(f"{field}: {name!r} is no gesture of {self.name}, expected any of {known}")
+
+    def may_be_own(self, name: str) -> bool:
+        """Whether a name may become that of a gesture of the user's own, and is no misspelt one of the models'."""
+        from difflib import get_close_matches
+
+        return is_name(name) and not get_close_matches(name, self.gestures, 1, SLIP)
 
     def gestures_in_use(self, chosen: Sequence[str] | None) -> tuple[str, ...]:
         """The chosen gestures in the models' order, all if `chosen` is None. Raises SettingsError."""
