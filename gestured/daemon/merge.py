@@ -38,7 +38,7 @@ def _from_file(path: str) -> dict[str, Any]:
         limit = f"{MAX_CONFIG_BYTES >> 20} MiB"
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
     except (ValueError, RecursionError) as error:  # bad bytes, syntax, or a number of thousands of digits
-        raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
+        raise SettingsError(f"config: {path} is not valid TOML: {error}{_twice(data)}") from error
     for name in TITLES.keys() & found.keys():  # our own names for tables are no keys of the file
         raise SettingsError(f"{name} ({path}): unknown key, expected [{TITLES[name]}]")
     if isinstance(found.get("gestures"), dict):
@@ -51,6 +51,15 @@ def _from_file(path: str) -> dict[str, Any]:
         if "socket" in tables:
             found["gates"] = tables.pop("socket")
     return found
+
+
+def _twice(data: bytes) -> str:
+    """A hint for each key of a file that stands beside a table of that name, which is no TOML."""
+    text, hint = data.decode(errors="replace"), ""
+    for key, (_, inner) in INSIDE.items():
+        if re.search(rf"^{key}\s*=", text, re.MULTILINE) and re.search(rf"^\[{key}[].]", text, re.MULTILINE):
+            hint += f"; beside a table [{key}] the key {key} is called {inner}, and stands below [{key}]"
+    return hint
 
 
 def from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:

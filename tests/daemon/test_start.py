@@ -211,6 +211,14 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ("sensors = 5", ("sensors = 5", "expected a table [sensors]")),
         ("max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ("listen = !", ("gestured.toml", "TOML", "line 1")),
+        (
+            "gestures = []\n[gestures.one_tap]\nthreshold = 0.5",
+            ("TOML", "key gestures is called use, and stands below [gestures]"),
+        ),
+        (
+            "gates = '/g.sock'\n[gates]\nstart = ['a']",
+            ("TOML", "key gates is called socket, and stands below [gates]"),
+        ),
         (f"stale_s = {'1' * 5000}", ("gestured.toml", "TOML", "4300 digits")),
     ],
 )
