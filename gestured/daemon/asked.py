@@ -16,6 +16,7 @@ from gestured.daemon.sinks import OscSink, UdpOut
 from gestured.daemon.tuio import TUIO, TuioSink
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, ladder_for, require_arming
+from gestured.model.rung import OtherGestures
 
 
 class Output(NamedTuple):
@@ -57,12 +58,13 @@ def outputs_of(settings: Settings) -> Iterator[Output]:
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     """Open and test the models, and check the settings that depend on them. Raises ModelError or SettingsError.
 
-    With `insist` a fallback is refused, since at a reload the model that already runs is better.
+    With `insist` no fallback may answer or know other gestures, since at a reload what already runs is better.
     """
     early: list[str] = []  # sentences that are logged only if opening succeeds, since else the error says them
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
-    if insist and ladder.degraded:
-        raise ModelError("; ".join(str(rung.refused) for rung in ladder.rungs[: ladder.rung]))
+    bad = [rung.refused for rung in ladder.rungs if ladder.degraded or isinstance(rung.refused, OtherGestures)]
+    if insist and bad:
+        raise ModelError("; ".join(str(one) for one in bad if one is not None))
     ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
         ladder.report(sentence)

@@ -18,7 +18,7 @@ from gestured.core.scene import Scene
 from gestured.model.limit import hurry
 from gestured.model.model import Model
 from gestured.model.own import Own
-from gestured.model.rung import Rung
+from gestured.model.rung import OtherGestures, Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
 SLOW_S = 0.05  # a run that takes longer counts as slow, since it delays an answer; some milliseconds are usual
@@ -205,10 +205,9 @@ class Ladder:
 
     def _require_same(self, rung: Rung, gestures: Sequence[str]) -> None:
         if gestures != self.gestures:
-            rung.refuse(
-                f"{rung.name}: cannot stand in for {self._active.name}, expected the same gestures in the same order "
-                f"({', '.join(self.gestures)}), found {', '.join(gestures)}"
-            )
+            expected = f"expected the same gestures in the same order ({', '.join(self.gestures)})"
+            said = f"{rung.name}: cannot stand in for {self._active.name}, {expected}, found {', '.join(gestures)}"
+            rung.refuse(OtherGestures(said))
 
     def _put_aside(self, rung: Rung, reason: str) -> None:
         rung.slow = 0

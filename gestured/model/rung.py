@@ -13,6 +13,10 @@ from gestured.model.shipped import shipped_gestures, shipped_name
 T = TypeVar("T")
 
 
+class OtherGestures(ModelError):
+    """A fallback knows other gestures than the model for which it should answer."""
+
+
 class Rung:
     """A model: open already, or a file that is opened when it is first needed.
 
@@ -39,10 +43,10 @@ class Rung:
             return self._once(lambda: shipped_gestures(self.source))
         return self.open().gestures
 
-    def refuse(self, reason: str) -> NoReturn:
-        """Raise ModelError with the reason, now and whenever the model is asked for."""
-        self.model, self.refused = None, ModelError(reason)
-        raise self.refused
+    def refuse(self, why: ModelError) -> NoReturn:
+        """Raise the error, now and whenever the model is asked for."""
+        self.model, self.refused = None, why
+        raise why
 
     def _once(self, look: Callable[[], T]) -> T:
         if self.refused is not None:

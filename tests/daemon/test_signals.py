@@ -77,12 +77,13 @@ def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: 
 
 
 def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path) -> None:
-    path = tmp_path / "mine.onnx"
+    path, spare = tmp_path / "mine.onnx", tmp_path / "spare.onnx"
     path.write_bytes(model.read_bytes())
+    spare.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
     config.write_text("")
     flags = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--stale-s", 30)
-    daemon = start(*flags, "--fallback", model, model=path)
+    daemon = start(*flags, "--fallback", spare, model=path)
     client = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
     stricter = "[gestures.swipe_left]\nthreshold = 1.0\n"
@@ -91,12 +92,16 @@ def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_pat
     config.write_text(stricter)
     path.write_bytes(model.read_bytes()[:3000])  # the fallback would do at a start, but a good model runs
     reload(daemon, "refused")
+    path.write_bytes(model.read_bytes())
+    tiny_model.make(spare, gestures=tiny_model.GESTURES[::-1])  # at a start the model would answer without it
+    reload(daemon, "refused")
     sensor.send(sensor.hand.idle(0.2))  # it may have been silent for long: a model is tried
     sensor.perform("left")
     (event,) = client.events("gesture", "arm")
     assert (event["gesture"], event["model"]) == ("swipe_left", "mine")
     said = [line["reason"] for line in lines_of(daemon.stderr()) if "refused" in line["event"]]
-    assert len(said) == 2 and "nonsense" in said[0] and said[1].startswith(f"{path}: ")  # no model is put aside
+    assert len(said) == 3 and "nonsense" in said[0] and said[1].startswith(f"{path}: ")  # no model is put aside
+    assert said[2].startswith("spare: cannot stand in for mine, ")
 
 
 def test_systemd_is_told(start, tmp_path: Path) -> None:
