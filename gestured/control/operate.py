@@ -108,6 +108,7 @@ def _reloaded(answer: dict[str, Any]) -> Iterable[str]:
     waiting = ", ".join(answer.get("awaiting_restart", ()))  # an older daemon does not tell
     rest = f"; not yet in use, since only a restart changes it: {waiting}" if waiting else ""
     yield f"reloaded; {answer['model']} answers{rest}"
+    yield from (f"a fallback cannot be used: {reason}" for reason in answer.get("refused", ()))
 
 
 def _gates(answer: dict[str, Any]) -> Iterable[str]:

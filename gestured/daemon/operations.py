@@ -55,7 +55,8 @@ class Operations:
         reason = await self._reload()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
-        return {"model": self._parts.ladder.active, "awaiting_restart": self._parts.awaiting_restart()}
+        ladder, waiting = self._parts.ladder, self._parts.awaiting_restart()
+        return {"model": ladder.active, "awaiting_restart": waiting, "refused": ladder.refused}
 
     async def recalibrate(self, connection: Connection, sensor: SensorName | None = None) -> Reply:
         """Learn one idle sensor anew, or all. Refused while one of them is touched, since a hand is no baseline."""

@@ -37,7 +37,7 @@ def status(parts: Parts) -> dict[str, Any]:
             "rung": ladder.rung,
             "degraded": ladder.degraded,
             "failures": ladder.failures,
-            "refused": [str(rung.refused) for rung in ladder.rungs if rung.refused is not None],
+            "refused": ladder.refused,
             "file": ladder.source,
             "version": ladder.model.metadata.version,
             "sha256": ladder.model.sha256,

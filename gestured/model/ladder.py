@@ -98,6 +98,11 @@ class Ladder:
         return self._active is not self.rungs[0]
 
     @property
+    def refused(self) -> list[str]:
+        """Why models cannot be used before a reload, a sentence for each such rung."""
+        return [str(rung.refused) for rung in self.rungs if rung.refused is not None]
+
+    @property
     def model(self) -> Model:
         """The active rung's model."""
         return self._active.open()

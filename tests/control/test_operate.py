@@ -165,10 +165,13 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon, mon
 
 def test_doctor_says_why_a_fallback_cannot_stand_in(run, serve, tmp_path: Path) -> None:
     other = tiny_model.make(tmp_path / "other.onnx", gestures=tiny_model.GESTURES[::-1])
+    missing = f"{tmp_path}/none.onnx: cannot be opened: No such file or directory\n"
     control = serve("--fallback", other, "--fallback", tmp_path / "none.onnx").ready["control"]
     said = run("doctor", "--control", control)[1]
     assert "warn    other: cannot stand in for tiny, expected the same gestures in the same order (one_tap" in said
-    assert f"warn    {tmp_path}/none.onnx: cannot be opened: No such file or directory\n" in said
+    assert f"warn    {missing}" in said
+    control = serve("--fallback", tmp_path / "none.onnx").ready["control"]
+    assert run("reload", "--control", control)[1] == f"reloaded; tiny answers\na fallback cannot be used: {missing}"
 
 
 def test_doctor_without_any_daemon_asks_whether_it_runs(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
