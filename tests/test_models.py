@@ -322,6 +322,16 @@ def test_what_kills_onnxruntime_kills_a_process_of_its_own(tmp_path: Path, monke
     assert "SIGSEGV" in refusal(tmp_path / "m.onnx")
 
 
+@pytest.mark.parametrize(("name", "value"), [("frozen", True), ("executable", None)])
+def test_a_program_without_a_python_does_not_start_itself_to_try_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: object
+) -> None:
+    monkeypatch.setattr(sys, name, value, raising=False)
+    monkeypatch.setattr(model_process, "Popen", lambda *_, **__: pytest.fail("it would try the file, too, and so on"))
+    (tmp_path / "m.onnx").write_bytes(b"any bytes")
+    assert "this program is frozen or embedded, and has no Python for that" in refusal(tmp_path / "m.onnx")
+
+
 def test_a_file_is_tried_with_few_variables_and_no_descriptors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", "/run/somewhere")
     monkeypatch.setattr(

@@ -78,6 +78,9 @@ def _end_of(child: "Popen[bytes]") -> str:
 
 
 def _started() -> "Popen[bytes]":
+    if getattr(sys, "frozen", False) or not sys.executable:  # what PyInstaller has frozen would start itself, endlessly
+        said = "this program is frozen or embedded, and has no Python for that"
+        raise ValueError(f"no process can be started to try it: {said}")
     root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
     command = [sys.executable, "-I", "-S", "-c", START, *folders]
