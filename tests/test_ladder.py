@@ -195,6 +195,15 @@ def test_own_model_has_no_fallback_but_those_that_are_named(shelf: Path, tmp_pat
     assert ladder_for(path, ["lstm"]).classify(segment()).model == "lstm"
 
 
+def test_a_models_file_has_a_path_that_is_valid_in_any_folder(shelf: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    build(Path("mine.onnx"))
+    assert ladder_for("mine.onnx").source == ladder_for(Path("mine.onnx")).source == str(tmp_path / "mine.onnx")
+    assert [ladder_for(name).source for name in ("lstm", "lstm.onnx")] == ["lstm", "lstm.onnx"]
+    build(Path("lstm.onnx"))
+    assert ladder_for("lstm.onnx").source == str(tmp_path / "lstm.onnx")
+
+
 def test_shipped_model_with_no_fallbacks_named(shelf: Path) -> None:
     (shelf / "cnn_lstm.onnx").unlink()
     with pytest.raises(ModelError, match=r"cnn_lstm\.onnx"):

@@ -1,6 +1,7 @@
 """A rung: one model of a ladder, and whether it can be used now."""
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn, TypeVar
@@ -35,6 +36,8 @@ class Rung:
         """The rung's model. Raises ModelError."""
         if self.model is None:
             self.model = self._once(lambda: open_model(self.source))
+            if shipped_name(self.source) != str(self.source).removesuffix(".onnx"):  # a file: others look at it, too
+                self.source = os.path.abspath(self.source)
         return self.model
 
     def gestures(self) -> tuple[str, ...]:
