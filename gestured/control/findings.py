@@ -93,6 +93,8 @@ def model_finding(name: str, sha256: str | None) -> Finding:
     try:
         report = check(name)
     except ModelError as error:
+        if sha256 is not None and isinstance(getattr(error.__cause__, "__cause__", None), PermissionError):
+            return Finding("warn", f"model {error}, but it runs", "ask as root, or as the daemon's account")
         return Finding("bad", f"model {error}", "copy the file again, or choose another model")
     if sha256 is not None and report["sha256"] != sha256:
         return Finding("warn", f"model {report['file']} is not the one that runs", "gesturectl reload")

@@ -12,7 +12,7 @@ import pytest
 
 from gestured.client import address
 from gestured.control.doctor import _buffer, _clock, _permissions, _port
-from gestured.control.findings import BUFFER_BYTES
+from gestured.control.findings import BUFFER_BYTES, model_finding
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
@@ -224,6 +224,16 @@ def test_a_socket_that_is_not_for_us_names_the_remedy(run, monkeypatch: pytest.M
         status, out, err = run(*command.split())
         assert status == 1 and "Permission denied: it is for members of its group" in out + err
         assert 'usermod -aG gestured,gestured-events "$USER"' in out + err
+
+
+def test_doctor_calls_no_model_bad_that_runs_and_that_only_the_daemon_may_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    def opened(path: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("gestured.model.file.open_regular", opened)
+    found = model_finding("/etc/gestured/mine.onnx", "0" * 64)
+    assert (found.level, found.remedy) == ("warn", "ask as root, or as the daemon's account")
+    assert model_finding("/etc/gestured/mine.onnx", None).level == "bad"
 
 
 def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
