@@ -65,14 +65,16 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> object:
-    from importlib import import_module
+if not TYPE_CHECKING:  # to a checker it would mean that any name is one of ours
 
-    if name not in __all__:
-        raise AttributeError(f"module 'gestured' has no attribute {name!r}")
-    found: object = getattr(import_module(f"gestured.{_HOMES.get(name, 'core.events')}"), name)
-    globals()[name] = found
-    return found
+    def __getattr__(name: str) -> object:
+        from importlib import import_module
+
+        if name not in __all__:
+            raise AttributeError(f"module 'gestured' has no attribute {name!r}")
+        found: object = getattr(import_module(f"gestured.{_HOMES.get(name, 'core.events')}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

@@ -181,6 +181,7 @@ for event in recognizer.push(0.0, [[0.0] * 9] * 9, touches=[gestured.Touch(1, 4.
 with gestured.Subscriber("/run/gestured/events.sock", types=["gesture"]) as events:
     for line in events:
         print(line["gesture"])
+gestured.Recogniser  # type: ignore[attr-defined]  # an ignored error that is none is one
 """
 
 
