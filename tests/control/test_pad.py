@@ -276,6 +276,23 @@ def test_a_message_that_was_lost_is_said_and_sent_again(udp: socket.socket, brow
             assert not server.pad.contacts.down
 
 
+def test_a_browser_of_2022_is_told_what_is_felt_and_tells_what_holds_still(browser: Browser) -> None:
+    older = browser.call(
+        "Page.addScriptToEvaluateOnNewDocument", source="delete AbortSignal.any; delete Array.prototype.with"
+    )
+    try:
+        with served() as (_, page):
+            browser.call("Page.navigate", url=page.whole)
+            browser.until("typeof state === 'object' && state.drawn > 0")
+            hand = Hand(browser)
+            hand.mouse(STILL, 0.1)
+            told = browser.run("[...down.values()][0][1]")
+            browser.until(f"[...down.values()][0][1] > {told}")
+            hand.let_go()
+    finally:
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", **older)
+
+
 def test_the_keys_that_a_collection_names_are_pressed_on_the_page_too(browser: Browser) -> None:
     pressed: list[str] = []
     with served() as (server, page):

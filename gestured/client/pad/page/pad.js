@@ -90,7 +90,7 @@ async function send() {
 
 setInterval(() => { // a finger that holds still is told, too: who says nothing touches nothing
   if (state.waiting.length) return;
-  for (const [id, what] of down) { down.set(id, what.with(1, performance.now() / 1000)); state.waiting.push(down.get(id)); }
+  for (const [id, what] of down) { down.set(id, [id, performance.now() / 1000, ...what.slice(2)]); state.waiting.push(down.get(id)); }
   send();
 }, STILL_MS);
 

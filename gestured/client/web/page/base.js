@@ -42,14 +42,17 @@ async function enter() { // by the token, else by the secret that this tab has k
 }
 
 async function listen(path, signal, hear, lost) { // server-sent events; EventSource sends no header
+  let late = null;
+  signal.addEventListener("abort", () => late?.abort()); // browsers before 2024 have no AbortSignal.any
   while (!signal.aborted) {
     let busy = "";
-    const late = new AbortController(), soon = what => { // a server that lives says so each 5 s
+    late = new AbortController();
+    const soon = what => { // a server that lives says so each 5 s
       const timer = setTimeout(() => late.abort(), SILENT_MS);
       return what.finally(() => clearTimeout(timer));
     };
     try {
-      const answer = await soon(ask(path, { signal: AbortSignal.any([signal, late.signal]) }));
+      const answer = await soon(ask(path, { signal: late.signal }));
       if (answer.status === 503) throw new Error(busy = await answer.text()); // there is no place now
       if (!answer.ok) { lost(await answer.text()); return; }
       const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
