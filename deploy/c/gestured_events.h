@@ -13,8 +13,6 @@
  * event.json, its whole line, which docs/wire.md of gestured describes. They know the outermost object alone: for `where`
  * or `scores` use a JSON library.
  *
- * With -std=c99 define _POSIX_C_SOURCE as 200809L before the first #include.
- *
  * SPDX-License-Identifier: Apache-2.0
  */
 #ifndef GESTURED_EVENTS_H
@@ -31,6 +29,10 @@
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
+
+#ifndef CLOCK_MONOTONIC
+#error "define _POSIX_C_SOURCE as 200809L before the first #include, or use a dialect such as -std=gnu11"
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -346,7 +348,7 @@ static inline void gestured_receive(struct gestured_events *events) {
 }
 
 /* The next event, within `timeout_ms`; -1 waits for ever, 0 looks whether one is there. It connects, and connects again,
- * by itself. */
+ * by itself. No signal ends the wait: where a handler sets a flag, give a timeout, and look at the flag after it. */
 static inline enum gestured_result gestured_next(struct gestured_events *events, struct gestured_event *event,
                                                  int timeout_ms) {
     const int64_t end = timeout_ms < 0 ? INT64_MAX : gestured_now_ms() + timeout_ms;

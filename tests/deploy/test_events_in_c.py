@@ -4,6 +4,7 @@ import ctypes
 import json
 import math
 import random
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -14,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.deploy.compilers import CPP, HERE, POSIX, C, compiled
+from tests.deploy.compilers import CPP, HEADERS, HERE, POSIX, C, compiled
 from tests.several import several
 from tests.sockets import GESTURE, HELLO, FakeDaemon
 
@@ -29,6 +30,15 @@ ALL = json.dumps({"types": ["gesture", "unknown", "status"]})
 def test_events_compile_without_a_warning(name: str, tmp_path: Path):
     standard, language = (CPP, "c++") if name.endswith("++") else (C, "c")
     compiled(name, standard, tmp_path / "events", POSIX, "-x", language, SOURCE)
+
+
+@pytest.mark.parametrize("standard", ["c99", "c11", "c17"])
+def test_a_strict_standard_is_told_what_it_has_to_define(standard: str):
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    command = ["gcc", f"-std={standard}", "-fsyntax-only", f"-I{HEADERS}", str(SOURCE)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert 'error: #error "define _POSIX_C_SOURCE as 200809L' in done.stderr
 
 
 class Program:
