@@ -88,6 +88,9 @@ class Daemon:
                 held, self._told = line["time"] - self._told, line["time"]
                 if held > HELD_S:
                     self._held, self._over = held, self._told + WORKS_OFF_S
+                elif held < 0:  # the clock was set back: an event that was on its way seemed to come before its time
+                    self._over = 0.0
+                    self._lags.clear()
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])
             case "gone":

@@ -597,6 +597,14 @@ def test_what_has_waited_while_the_daemon_was_held_up_is_old() -> None:
     assert age(400.0, 1900.1, "door") == 0.0  # its clock is wrong
 
 
+def test_an_event_that_was_on_its_way_when_the_clock_was_set_back_makes_no_later_one_old() -> None:
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    for told, decided, now in ((5000.0, 5000.5, 5000.5), (5001.0, 5001.5, 1401.5), (1402.0, 1402.5, 1402.5)):
+        daemon.take(STATUS | {"time": told})
+        late = daemon.age(gesture(1, decided=decided), now)
+    assert late == 0.0
+
+
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An authority, a broker's certificate for 127.0.0.1, and another authority."""
