@@ -38,7 +38,7 @@ class Subscriber:
     line in which a field is missing, or has another type than the protocol says, is skipped and reported to `say`.
     If `status` is among the types, a daemon that says nothing for ten seconds hangs, and counts as gone.
 
-    One thread iterates; any thread may `close` it, which ends the iteration.
+    One thread iterates; any thread may `close` it, which ends the iteration. In a forked child it connects anew.
     """
 
     def __init__(  # noqa: PLR0913 - keywords, each a choice of its own
@@ -65,7 +65,7 @@ class Subscriber:
             raise TypeError("Subscriber: expected the path of at least one event socket")
         self.hello: dict[str, Any] = {}
         self.path = Path(paths[0])
-        self._sources = [_Source(Path(path)) for path in paths]
+        self._paths = [Path(path) for path in paths]
         wanted = {"types": types, "sensors": sensors, "gestures": gestures, "zones": zones}
         # A text is passed on as it is, since the daemon's error about a text is clearer than one about its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
@@ -73,12 +73,18 @@ class Subscriber:
         # Whether a daemon that says nothing must hang: one that is asked for its status tells it each second.
         self._alive = types is not None and "status" in types
         self._timeout, self._reconnect, self._say = timeout, reconnect, say
+        self._iterating = Lock()
+        self._closed = False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Be connected to nothing. A forked child needs this, since all it has is shared with its parent."""
+        self._pid = os.getpid()
+        self._sources = [_Source(path) for path in self._paths]
         self._unread: deque[tuple[_Source, bytes]] = deque()
         self._selector = selectors.DefaultSelector()
         self._wake, self._woken = socket.socketpair()
         self._selector.register(self._woken, selectors.EVENT_READ)
-        self._iterating = Lock()
-        self._closed, self._pid = False, os.getpid()
 
     def __iter__(self) -> Self:
         return self
@@ -134,6 +140,8 @@ class Subscriber:
         """The next line; None once the subscriber is closed. Raises TimeoutError if none has come by `end`."""
         try:
             with self._iterating:
+                if os.getpid() != self._pid:
+                    self._begin()
                 while not self._closed:
                     if self._unread:
                         if (found := self._read(*self._unread.popleft())) is not None:
@@ -167,7 +175,6 @@ class Subscriber:
                 self._gone(source, Unreachable(f"the daemon on {source.path} {SILENT}"))
 
     def _call(self, source: "_Source", now: float) -> None:
-        self._pid = os.getpid()  # the process that the connections belong to
         try:
             source.lines = Lines(source.path, "--socket")
         except Forbidden:  # another attempt would change nothing

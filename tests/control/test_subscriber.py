@@ -3,6 +3,7 @@
 import json
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -150,6 +151,20 @@ def test_close_in_a_forked_child_leaves_the_connection_to_its_parent(fake: FakeD
         child.join()
         fake.say(GESTURE | {"sequence": 5})
         assert next(subscriber)["sequence"] == 5 and child.exitcode == 0
+
+
+def test_a_forked_child_has_a_connection_of_its_own(fake: FakeDaemon):
+    """It would otherwise take lines of its parent's, and wake for ever once its parent has closed."""
+    with Subscriber(fake.path) as subscriber:
+        asked(fake, subscriber, GESTURE)
+        parents = fake.client
+        child = get_context("fork").Process(target=lambda: sys.exit(next(subscriber)["sequence"]), daemon=True)
+        child.start()
+        fake.accept()
+        fake.say(GESTURE | {"sequence": 6})
+        child.join()
+        parents.sendall(json.dumps(GESTURE | {"sequence": 5}).encode() + b"\n")
+        assert next(subscriber)["sequence"] == 5 and child.exitcode == 6
 
 
 def test_a_timeout_says_which_daemon_is_not_there(tmp_path: Path):
