@@ -61,6 +61,7 @@ class Daemon:
         self.version = ""  # of the last daemon that was there
         self.states: dict[str, str] = {}  # by sensor, the latest news last; kept while the daemon is away
         self.gestures: list[str] | None = None  # None until the daemon has told them
+        self._unsure: set[str] = set()  # names in the hello that no status has told: perhaps of tests alone
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._told = math.inf  # s since 1970, when the daemon last said its status
@@ -76,7 +77,9 @@ class Daemon:
                 self._lags.clear()  # a restarted daemon takes each sensor's clock anew
                 self._gestures(line["gestures"])
                 self.listening = dict(line.get("gates", {}))
+                unsure = line["sensors"].keys() - self.states.keys()
                 self._heard({name: self.states.get(name, "no_data") for name in line["sensors"]})
+                self._unsure = unsure
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
@@ -93,6 +96,7 @@ class Daemon:
                     self._lags.clear()
                 self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])
+                self._unsure = set()
             case "gone":
                 self.hello = {}
                 self._counts.connected("daemon", False, f"no daemon answers on {line['path']}; waiting for it")
@@ -134,7 +138,7 @@ class Daemon:
         """
         wanted = self._wanted_sensors
         new = {name: state for name, state in heard.items() if wanted is None or name in wanted}
-        states = {name: "no_data" for name in self.states if name not in new} | new
+        states = {name: "no_data" for name in self.states if name not in new and name not in self._unsure} | new
         self.states = dict(list(states.items())[-MOST_SENSORS:])
 
     def _gestures(self, known: Sequence[str]) -> None:

@@ -498,6 +498,14 @@ def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch)
     assert daemon.states == {"invented8": "no_data", "armrest": "ok", "invented9": "ok"}
 
 
+def test_a_name_of_a_test_is_no_sensor():
+    """The hello of a daemon holds it, as the sequence of its events goes on."""
+    daemon = known.Daemon(None, None, Counts("mqtt"))
+    daemon.take(HELLO | {"sensors": {"armrest": 3, "test": 1}})
+    daemon.take(STATUS)
+    assert daemon.states == {"armrest": "ok"}
+
+
 def test_sequences_go_on_where_there_are_as_many_sensors_as_are_remembered(monkeypatch):
     monkeypatch.setattr(known, "MOST_SENSORS", 2)
     daemon = known.Daemon(None, None, Counts("mqtt"))
