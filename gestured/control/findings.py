@@ -29,7 +29,7 @@ class Finding:
 DROPS = {  # by reason: what the dropped packets did, and what to do
     "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
     "size": "had another number of taxels than the grid: gesturectl sniff proposes one",
-    "types": "held neither numbers nor one blob: gesturectl sniff shows what arrives",
+    "types": "had other type tags than f, i or one b: gesturectl sniff shows what arrives",
     "not_allowed": "came from a source that is not under allow",
     "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
     "too_many_sensors": "were of more sensors than max_sensors: look for a sender that changes its name",

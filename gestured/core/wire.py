@@ -260,7 +260,7 @@ class Decoder:
         if types and (not types.strip("i") or not types.removeprefix("i").strip("f")):
             text = f"{address}: expected {rows}x{columns} values, found {len(types)} numbers"
             return _Route(sensor, None, False, ("size", text))
-        text = f"{address}: expected numbers or one blob, found type tags {types[:16]!r}"
+        text = f"{address}: expected the type tags f, i or one b, found {types[:16]!r}"
         return _Route(sensor, None, False, ("types", text))
 
     def _join(self, found: list[tuple[int, str, Arrival | tuple[Touch, ...]]], source: Hashable) -> list[Arrival]:

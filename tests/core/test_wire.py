@@ -205,6 +205,11 @@ def test_what_is_wrong_is_refused_by_reason(packet: bytes, reason: str) -> None:
     assert fault(packet) == reason
 
 
+def test_numbers_of_other_types_are_told_which_are_taken() -> None:
+    _, [error] = decoder().decode(encoding.message("/s/pressure", "d" * SIZE, [0.0] * SIZE))
+    assert str(error).startswith("/s/pressure: expected the type tags f, i or one b, found 'dddd")
+
+
 def test_good_messages_survive_bad_siblings() -> None:
     good = [pressure([float(n)] * SIZE, n) for n in range(3)]
     bad = [pressure([math.nan] * SIZE, 7), blob(b"x"), b"/x\0\0", trajectory((1, math.nan, 0.0))]
