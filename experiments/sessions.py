@@ -3,8 +3,7 @@
     python -m experiments.sessions --real FOLDER --document docs/figures.md
 
 Frames pass through the daemon's own path, from the first one on. Answers that are published at `normal` count. Touches
-that the recordings do not name (`other`) are neither right nor false, and neither is anything within half a second of
-one.
+that the recordings do not name (`other`) are neither right nor false.
 """
 
 from pathlib import Path

@@ -94,6 +94,20 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
     assert (unknown["meant"], unknown["right"]) == (0, None) and known["meant"] == len(events)
 
 
+@pytest.mark.parametrize(("label", "false"), [(UNNAMED, 0), (NONE, 1)])
+def test_the_answer_to_a_touch_just_after_a_gesture_is_not_the_gestures(label: str, false: int) -> None:
+    """As `gesturectl tune` has it: what is overlapped comes before what is merely near."""
+    one = session(9100, "nominal", 12.0, 0.0)
+    first = one["events"][0]
+    end = float(first["onset"]) - 0.2
+    frames = [Frame(float(t), values) for t, values in zip(one["times"], one["frames"], strict=True) if t < end + 3.0]
+    gesture, touch = Performed("swipe_up", "", end - 0.5, end), Performed(label, "", end + 0.2, float(first["release"]))
+    life = Stretch("a", "b", frames, Setup(grid=(9, 9)), [gesture], [], others=[touch])
+    (model, *_) = command.rungs("cnn_lstm")
+    counts = judged([hear(life, [model], "normal")], model.name, 0.0).said
+    assert (counts["missed"], counts["false"]) == (1, false)
+
+
 def test_one_frame_is_no_place_a_blink_is_no_hour_and_milliseconds_are_no_seconds(
     tmp_path: Path, everyday: Run, said: Callable[..., Any]
 ) -> None:

@@ -20,12 +20,11 @@ from gestured.core.sensor import ABSENT_S, Sensor, Told
 from gestured.lab.everyday.stretches import HEARD, HOUR_S, WOKEN, Stretch
 from gestured.lab.intervals import rate
 from gestured.model.model import Model
-from gestured.record.judge import NONE, Performed, Said, verdicts, whose
+from gestured.record.judge import NONE, UNNAMED, Performed, Said, verdicts, whose
 from gestured.simulator import GESTURES
 
 TAPS = (ONE_TAP, DOUBLE_TAP)
 LONGEST_STEP_S = 1.0  # s, the most of a step between frames that counts as deaf; in a longer one the sensor was silent
-ASIDE_S = 0.2  # s beyond the judge's tolerance: answers within half a second of an unnamed touch are not counted
 NOT_READY, RESTARTING, HELD = "not ready", "restarting", "spent"  # why a sensor is deaf
 
 
@@ -67,8 +66,9 @@ def hear(
     sensor = Sensor("lab", scene, first)
     sensor.foresee(asked=True)
     meant = [act for act in life.meant if act.label in first.gestures]
-    own = [act for act in life.meant if act.label not in first.gestures]  # gestures of the user's own are enrolled
-    life = replace(life, meant=meant, unnamed=[*life.unnamed, *own])
+    # Gestures of the user's own are enrolled: none of the model's answers is right or wrong for them.
+    own = [replace(act, label=UNNAMED) for act in life.meant if act.label not in first.gestures]
+    life = replace(life, meant=meant, others=[*life.others, *own])
     heard = Heard(life.place, life.person, 0, meant, {model.name: [] for model in models})
     began: float | None = None
     last, absent_s, known, onsets = 0.0, 0.0, False, 0
@@ -85,7 +85,8 @@ def hear(
         _take(heard, told, life, models, published=published)
     _take(heard, sensor.flush(last + 5.0), life, models, published=published)
     heard.seconds = last - (last if began is None else began) - absent_s
-    heard.contacts = max(onsets - len(meant) - len(life.unnamed), 0) if life.contacts is None else life.contacts
+    told_of = len(meant) + sum(act.label == UNNAMED for act in life.others)
+    heard.contacts = max(onsets - told_of, 0) if life.contacts is None else life.contacts
     return heard
 
 
@@ -102,25 +103,24 @@ def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Mo
     answer: Gesture | Unknown | None = None
     for one in told:
         if isinstance(one, Provisional):
-            heard.provisional += _whose(one.gesture, one.onset, one.decided, life)[1]
+            heard.provisional += _whose(one.gesture, one.onset, one.decided, life) is None
         elif isinstance(one, Gesture | Unknown):
             answer = one
         elif isinstance(one, Decided) and not (isinstance(answer, Unknown) and (published or answer.reason == "hole")):
             for model in models:
                 scores = one.scores if model is models[0] else model.classify(one.segment)
                 name = model.gestures[int(scores.values.argmax())]
-                act, nobodys = _whose(name, one.segment.onset, one.segment.offset, life)
-                if act is not None or nobodys:
+                act = _whose(name, one.segment.onset, one.segment.offset, life)
+                if act is None or act.label != UNNAMED:
                     heard.said[model.name].append(Said(name, scores.confidence, act))
 
 
-def _whose(gesture: str, onset: float, offset: float, life: Stretch) -> tuple[Performed | None, bool]:
-    """The gesture that was meant then; if none was, and the answer is a tap, the tap that nobody meant.
-
-    And whether there was neither, nor a touch of which nobody knows what it was.
-    """
-    act = whose(onset, offset, life.meant) or (whose(onset, offset, life.taps) if gesture in TAPS else None)
-    return act, act is None and whose(onset - ASIDE_S, offset + ASIDE_S, life.unnamed) is None
+def _whose(gesture: str, onset: float, offset: float, life: Stretch) -> Performed | None:
+    """What an answer belongs to: a performance, or a tap that nobody meant; None if the answer is a false gesture."""
+    act = whose(onset, offset, [*life.meant, *life.others])
+    if act is None and gesture in TAPS:
+        return whose(onset, offset, life.taps)
+    return None if act is not None and act.label == NONE else act
 
 
 FEW = 5  # people; an interval over fewer says nothing

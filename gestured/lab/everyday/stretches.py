@@ -34,7 +34,7 @@ class Stretch:
     taps: list[Performed]  # contacts that nobody meant, but that are taps
     contacts: int | None = None  # contacts that nobody meant; None if only the front end can count them
     tap_gap_s: float = Timing().tap_gap_s
-    unnamed: Sequence[Performed] = ()  # touches of which nobody knows what they were
+    others: Sequence[Performed] = ()  # non-gestures that were performed, and touches that nobody has named
 
 
 def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
@@ -67,12 +67,12 @@ def _arrays(path: Path) -> Iterator[Stretch]:
     for i, whole in enumerate(found.labels):
         start, end = map(float, found.times_of(i)[[0, -1]])
         acts = [Performed(str(label), "", float(on), float(off)) for n, label, on, off in told if n == i]
-        if whole not in (NONE, SESSION):
+        if whole != SESSION:
             acts.append(Performed(str(whole), "", start, end))
         meant = [act for act in acts if act.label not in (NONE, UNNAMED)]
-        unnamed = [act for act in acts if act.label == UNNAMED]
+        others = [act for act in acts if act.label in (NONE, UNNAMED)]
         setup = Setup(grid=found.frames.shape[1:])
-        yield Stretch(shown(path.stem), str(found.subjects[i]), found.stream(i), setup, meant, [], unnamed=unnamed)
+        yield Stretch(shown(path.stem), str(found.subjects[i]), found.stream(i), setup, meant, [], others=others)
 
 
 def _tape(path: Path) -> Iterator[Stretch]:
