@@ -31,6 +31,7 @@ from gestured.lab.own.learn import PEOPLE, teach
 from gestured.lab.points import by_strictness
 from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
+from gestured.lab.recordings.protocol import one_spelling
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.written import write
 from gestured.model.shipped import shipped_name
@@ -105,7 +106,8 @@ def _learned_from(base: Base, recordings: list[Path]) -> list[dict[str, Any]]:
     """
     before, new = json.loads(base.model.properties.get(KEY, "[]")), origins(recordings)
     for old, one in product(before, new):
-        if old["sha256"] == one["sha256"] or old.get("consents", {}).keys() & one["subjects"]:
+        known, here = (set(map(one_spelling, names)) for names in (old.get("consents", {}), one["subjects"]))
+        if old["sha256"] == one["sha256"] or known & here:
             raise GesturedError(
                 f"--base: {base.model.name} has learned from {old['file']}, so that nobody in {one['file']} can be "
                 "held out; expected the model that it was made of, and all recordings"

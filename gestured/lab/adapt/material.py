@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import recorded
+from gestured.lab.recordings.protocol import one_spelling
 from gestured.lab.recordings.store import touched
 from gestured.lab.samples import Samples, collect, join
 from gestured.record.arrays import read_timed
@@ -66,6 +68,12 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
             raise RecordingError(
                 f"{path}: subjects: expected at most {MOST_PEOPLE} people, found more; is it the number of the trial?"
             )
+        for one, other in pairwise(sorted(names, key=one_spelling)):
+            if one_spelling(one) == one_spelling(other):
+                raise RecordingError(
+                    f"{path}: subjects: expected one name for each person, found {one!r} and {other!r}; if that is one "
+                    "person, who is held out would be learned from; if not, they need names less alike"
+                )
         found = _named(replace(found, subjects=people), path, as_none, left)
         for part in _sittings(found):
             samples = _cut(part, path)

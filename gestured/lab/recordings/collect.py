@@ -21,7 +21,7 @@ from gestured.client.say import say_json
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.live import LiveSensor
-from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left, order
+from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left, one_spelling, order
 from gestured.lab.recordings.quality import Captured, faults
 from gestured.lab.recordings.store import join_recordings, recording
 from gestured.lab.recordings.terminal import KIND, NON_GESTURES, RATE_HZ, Ended, PadTerminal, Terminal
@@ -242,8 +242,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def already(path: Path, participant: str, grid: tuple[int, int]) -> Recordings | None:
-    """The recordings of an earlier session. Raises RecordingError if they are of another participant or grid."""
+    """The recordings of an earlier session. Raises RecordingError if they are of another participant or grid.
+
+    Also if there are none, but some of a participant whose name differs in spelling alone: 7, where there is 07.
+    """
     if not path.exists():
+        like = [other for other in path.parent.glob("*.npz") if one_spelling(other.stem) == one_spelling(participant)]
+        if like:
+            raise RecordingError(f"{like[0]}: is there; expected that name, or one less like it than {participant}")
         return None
     kept = read(path)
     others = sorted(set(kept.subjects.astype(str).tolist()) - {participant})

@@ -14,6 +14,7 @@ import numpy as np
 from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.origin import said
+from gestured.lab.recordings.protocol import one_spelling
 from gestured.record.arrays import read, write
 from gestured.record.recordings import Recordings
 
@@ -25,10 +26,12 @@ def run(args: argparse.Namespace) -> int:
     name = args.participant
     searched, unread = _files(args.paths)
     found: dict[Path, tuple[int, int]] = {}  # how many recordings are the participant's, and how many there are
+    like: set[str] = set()  # who may be the participant under another spelling
     for file in searched:
         try:
             subjects = read(file).subjects.astype(str)
             own = int((subjects == name).sum())
+            like |= {one for one in subjects.tolist() if one_spelling(one) == one_spelling(name)} - {name}
             if 0 < own < len(subjects):
                 _whole(file)
         except RecordingError as error:
@@ -39,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     models = {str(path): _learned(path, name) for path in sorted(args.models.glob("*.onnx"))}
     lines = [f"{file}: {own} of {every} recordings" for file, (own, every) in found.items()]
     lines = lines or [f"no recording of {name} was found"]
+    lines += [f"recordings of {one!r} stay: is that the same participant?" for one in sorted(like)]
     lines += [f"not looked into: {reason}" for reason in unread]
     lines += [f"model {model}: {answer}" for model, answer in models.items()]
     lines += [] if models else [f"no model to ask: {args.models} holds no *.onnx"]

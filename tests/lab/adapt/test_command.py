@@ -171,6 +171,8 @@ def test_a_base_that_has_learned_from_a_recording_or_a_person_is_refused(run: Ru
     write(tmp_path / "a.npz", made)
     write(tmp_path / "longer.npz", made.take(np.arange(len(made) - 1)))
     write(tmp_path / "later.npz", replace(made.take(np.arange(20, 40)), consents=np.full(20, "2026-02-15")))
+    seventh = replace(made.take(np.arange(20)), subjects=np.full(20, 7), times=made.times[: made.offsets[20]] / 2)
+    write(tmp_path / "seventh.npz", seventh)
     write(tmp_path / "others.npz", replace(made, subjects=np.char.add(made.subjects, "b")))
     taught, proto = tmp_path / "taught.onnx", onnx.load(base)
     entry = next(entry for entry in proto.metadata_props if entry.key == KEY)
@@ -178,7 +180,7 @@ def test_a_base_that_has_learned_from_a_recording_or_a_person_is_refused(run: Ru
     for entry in [entry for entry in proto.metadata_props if entry.key == "digest"]:
         proto.metadata_props.remove(entry)
     onnx.save(proto, taught)
-    for name in ("a.npz", "longer.npz", "later.npz"):
+    for name in ("a.npz", "longer.npz", "later.npz", "seventh.npz"):
         status, _, err = run(name, "--out", "my.onnx", "--base", taught, "--force")
         assert status == 1
         assert f"--base: taught has learned from a.npz, so that nobody in {name} can be held out" in err

@@ -109,7 +109,11 @@ def test_what_cannot_be_learned_from_is_refused_in_one_sentence(tmp_path: Path) 
     write(tmp_path / "ms.npz", replace(good, times=good.times * 1e3))
     copies = good.take(np.array([5, 0]))
     write(tmp_path / "copies.npz", replace(copies, subjects=np.array(["berta"] * 2), times=copies.times + 9.0))
+    write(tmp_path / "anna.npz", replace(good, subjects=np.array(["ANNA"] * len(good)), times=good.times / 2))
+    write(tmp_path / "seven.npz", replace(good, subjects=np.where(np.arange(len(good)) % 2, "07", "7.0")))
     for names, reason in (
+        (["good.npz", "anna.npz"], r"anna.npz: subjects: expected one name for each person, found 'anna' and 'ANNA';"),
+        (["seven.npz"], r"seven.npz: subjects: expected one name for each person, found '7.0' and '07';"),
         (["few.npz"], r"few.npz: expected at least 20 gestures of the model, found 3"),
         (["waves.npz"], r"found 0; names of your own are enrolled, not learned: wave"),
         (["one.npz"], r"one.npz: frames of recording 0: expected more than one"),

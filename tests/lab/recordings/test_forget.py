@@ -97,6 +97,13 @@ def test_a_person_whom_the_recordings_call_by_a_name_is_forgotten(tmp_path: Path
     assert read(tmp_path / "named.npz").subjects.tolist() == ["08"]
 
 
+def test_a_participant_of_another_spelling_stays_and_is_told(path: Path, forget: Run) -> None:
+    before = contents(path)
+    out = forget("7", path, "--yes")[1]
+    assert "no recording of 7 was found\nrecordings of '07' stay: is that the same participant?\n" in out
+    assert contents(path) == before and "stay" not in forget("07", path, "--yes")[1]
+
+
 def test_numbers_as_subjects_are_found_too(tmp_path: Path, forget: Run) -> None:
     write(tmp_path / "numbers.npz", example())
     assert forget("3", tmp_path / "numbers.npz", "--yes")[0] == 0
