@@ -144,12 +144,19 @@ def test_of_a_tape_all_that_the_daemon_would_publish_is_false(everyday: Run) -> 
     assert found["contacts"] == onsets
 
 
-def test_tapes_of_one_name_in_two_folders_are_not_one_person(tmp_path: Path, said: Callable[..., Any]) -> None:
+def test_files_of_one_name_in_two_folders_are_neither_one_person_nor_one_place(
+    tmp_path: Path, said: Callable[..., Any]
+) -> None:
     paths, tape = [tmp_path / folder / "day.mcap" for folder in ("monday", "tuesday")], ROOT / "docs" / "demo.mcap"
     for n, path in enumerate(paths):
         path.parent.mkdir()
         path.write_bytes(tape.read_bytes()[: tape.stat().st_size - n])  # the second one is cut off
-    assert said("--recordings", *paths)["people"] == 2
+    found = said("--recordings", *paths)
+    assert found["people"] == 2 and list(found["places"]) == [f"{path}: armrest" for path in paths]
+    for n, path in enumerate(paths):
+        write(path.with_suffix(".npz"), untouched(np.arange(60 + n) / 15))
+    paths = [path.with_suffix(".npz") for path in paths]
+    assert list(said("--recordings", *paths)["places"]) == [str(path) for path in paths]
 
 
 @pytest.mark.parametrize("lived", [lambda: lived(FIRST, SHORT_S), lambda: foreign_lived("nominal", FIRST)])

@@ -103,4 +103,6 @@ def _lived(model: str, strictness: Strictness, arming: Arming | None, seed: int)
 
 
 def _recorded(paths: Sequence[Path], model: str, strictness: Strictness, n: int) -> list[Heard]:
-    return [hear(life, at(model, strictness), strictness) for life in recorded(paths[n])]
+    alone = [path.stem for path in paths].count(paths[n].stem) == 1
+    lives = recorded(paths[n], "" if alone else str(paths[n]))
+    return [hear(life, at(model, strictness), strictness) for life in lives]

@@ -52,15 +52,15 @@ def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
     return Stretch(life.place, str(life.person), frames, setup, meant, taps, life.contacts)
 
 
-def recorded(path: Path) -> Iterator[Stretch]:
-    """The streams of a file. What was performed counts as meant if an .npz holds it; a tape does not hold it.
+def recorded(path: Path, place: str = "") -> Iterator[Stretch]:
+    """The streams of a file, whose place is its name unless told. What was performed is meant; a tape does not hold it.
 
     Raises RecordingError.
     """
-    yield from _arrays(path) if path.suffix == ".npz" else _tape(path)
+    yield from (_arrays if path.suffix == ".npz" else _tape)(path, shown(place or path.stem))
 
 
-def _arrays(path: Path) -> Iterator[Stretch]:
+def _arrays(path: Path, place: str) -> Iterator[Stretch]:
     found = read_timed(path)
     events = (found.event_recording, found.event_labels, found.event_onsets, found.event_offsets)
     told = [] if any(field is None for field in events) else list(zip(*events, strict=True))  # type: ignore[arg-type]
@@ -72,14 +72,14 @@ def _arrays(path: Path) -> Iterator[Stretch]:
         meant = [act for act in acts if act.label not in (NONE, UNNAMED)]
         others = [act for act in acts if act.label in (NONE, UNNAMED)]
         setup = Setup(grid=found.frames.shape[1:])
-        yield Stretch(shown(path.stem), str(found.subjects[i]), found.stream(i), setup, meant, [], others=others)
+        yield Stretch(place, str(found.subjects[i]), found.stream(i), setup, meant, [], others=others)
 
 
-def _tape(path: Path) -> Iterator[Stretch]:
+def _tape(path: Path, place: str) -> Iterator[Stretch]:
     tape, maker = opened(path)
     used = frames_used(tape, maker.scene)
     if not used:
         raise RecordingError(f"{path}: holds no frames that a daemon could use")
     for name, frames in used.items():
         setup = Setup(maker.scene.grid_of(name), maker.scene.setup(name).mounting)
-        yield Stretch(f"{shown(path.stem)}: {name}", str(path), frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
+        yield Stretch(f"{place}: {name}", str(path), frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
