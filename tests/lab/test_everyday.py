@@ -4,6 +4,7 @@ import errno
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,9 @@ from gestured.core.frames import Frame
 from gestured.core.listening import Arming
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import ABSENT_S, Sensor
+from gestured.core.where import Zone
 from gestured.lab.digest import file_digest
-from gestured.lab.everyday import FIRST, command
+from gestured.lab.everyday import FIRST, command, stretches
 from gestured.lab.everyday.hours import FEW, HELD, LEVELS, NOT_READY, RESTARTING, Heard, hear, judged, points_of
 from gestured.lab.everyday.picture import draw
 from gestured.lab.everyday.report import figures, tables
@@ -142,6 +144,17 @@ def test_of_a_tape_all_that_the_daemon_would_publish_is_false(everyday: Run) -> 
     }
     onsets = sum(isinstance(event, Onset) for event in events)
     assert found["contacts"] == onsets
+
+
+def test_the_zones_of_a_tape_decide(monkeypatch: pytest.MonkeyPatch, said: Callable[..., Any]) -> None:
+    tape, maker = opened(ROOT / "docs" / "demo.mcap")
+    silent = {"left": Zone((0.0, 0.0, 0.5, 1.0), ())}
+    maker = replace(maker, scene=replace(maker.scene, sensors={"armrest": Setup(zones=silent)}))
+    monkeypatch.setattr(stretches, "opened", lambda _: (tape, maker))
+    events = Replay(tape, maker.scene, *command.rungs("cnn_lstm")[:1]).events()
+    names = [event.gesture for event in events if isinstance(event, Gesture)]
+    found = said("--recordings", ROOT / "docs" / "demo.mcap")["gestures"]
+    assert {name: of["false"] for name, of in found.items() if of["false"]} == {n: names.count(n) for n in names} != {}
 
 
 def test_files_of_one_name_in_two_folders_are_neither_one_person_nor_one_place(

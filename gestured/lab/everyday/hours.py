@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.decision import Decision
 from gestured.core.events import Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Decided
 from gestured.core.front_end import FrontEnd
@@ -107,12 +108,14 @@ def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Mo
         elif isinstance(one, Gesture | Unknown):
             answer = one
         elif isinstance(one, Decided) and not (isinstance(answer, Unknown) and (published or answer.reason == "hole")):
+            decision = Decision(Scene(models[0].gestures, (9, 9), {"lab": life.setup}), "lab")
+            zone = answer.where.zone if answer and answer.where else None
             for model in models:
                 scores = one.scores if model is models[0] else model.classify(one.segment)
-                name = model.gestures[int(scores.values.argmax())]
+                _, name, confidence = decision.best(model.gestures, scores, zone)
                 act = _whose(name, one.segment.onset, one.segment.offset, life)
                 if act is None or act.label != UNNAMED:
-                    heard.said[model.name].append(Said(name, scores.confidence, act))
+                    heard.said[model.name].append(Said(name, confidence, act))
 
 
 def _whose(gesture: str, onset: float, offset: float, life: Stretch) -> Performed | None:

@@ -29,7 +29,7 @@ class Stretch:
     place: str
     person: str
     frames: Iterable[Frame]
-    setup: Setup  # the sensor's; only grid and mounting count
+    setup: Setup  # the sensor's; only grid, mounting and zones count
     meant: list[Performed]  # gestures
     taps: list[Performed]  # contacts that nobody meant, but that are taps
     contacts: int | None = None  # contacts that nobody meant; None if only the front end can count them
@@ -81,5 +81,6 @@ def _tape(path: Path, place: str) -> Iterator[Stretch]:
     if not used:
         raise RecordingError(f"{path}: holds no frames that a daemon could use")
     for name, frames in used.items():
-        setup = Setup(maker.scene.grid_of(name), maker.scene.setup(name).mounting)
+        own = maker.scene.setup(name)
+        setup = Setup(maker.scene.grid_of(name), own.mounting, zones=own.zones)
         yield Stretch(f"{place}: {name}", str(path), frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)
