@@ -67,8 +67,6 @@ def run(args: argparse.Namespace) -> int:
     """Send the recording, or play it here; returns 1 if a comparison finds differences."""
     _check(args)
     source: Playable = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
-    if not source.tape.whole:
-        say(f"{args.file}: writing was cut off; what is there is played", to=sys.stderr)
     if not source.tape.packets:
         raise RecordingError(f"{args.file}: holds no packets")
     if args.to is None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import sys
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from gestured.client.say import say
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
@@ -38,12 +40,18 @@ class Maker:
 
 
 def opened(path: str | Path) -> tuple[Tape, Maker]:
-    """The tape in a file, and the daemon that made it. Raises RecordingError, which names the file."""
+    """The tape in a file, which says on standard error if its end is missing, and the daemon that made it.
+
+    Raises RecordingError, which names the file.
+    """
     found = read(path)
     try:
-        return found, maker(found.scene)
+        made_by = maker(found.scene)
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from None
+    if not found.whole:
+        say(f"{path}: is cut off or damaged; what is good before that is used", to=sys.stderr)
+    return found, made_by
 
 
 def maker(told: Mapping[str, Any]) -> Maker:

@@ -18,7 +18,7 @@ from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
-from tests.control.conftest import gestures
+from tests.control.conftest import ROOT, gestures
 from tests.control.test_foreign_text import HOSTILE, plain
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
@@ -175,6 +175,17 @@ def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path
         assert not found.whole and found.packets == whole.packets[: len(found.packets)]
         read.append(len(found.packets))
     assert read and read == sorted(read)
+
+
+@pytest.mark.parametrize("words", [("tune",), ("replay",), ("export", "out.npz")])
+def test_each_command_that_reads_a_tape_says_once_that_it_is_cut_off(
+    run, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command, *out = words
+    Path("short.mcap").write_bytes((ROOT / "docs" / "demo.mcap").read_bytes()[:-1])
+    _, _, err = run(command, "short.mcap", *out)
+    assert err.count("short.mcap: is cut off or damaged; what is good before that is used\n") == 1
 
 
 def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, serve, tmp_path: Path) -> None:
