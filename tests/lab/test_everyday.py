@@ -29,6 +29,7 @@ from gestured.lab.everyday.picture import draw
 from gestured.lab.everyday.report import figures, tables
 from gestured.lab.everyday.stretches import HEARD, WAKING, WOKEN, Stretch, lived
 from gestured.lab.made_of import LINE
+from gestured.lab.table import Table
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
 from gestured.record.judge import NONE, UNNAMED, Performed, Said
@@ -343,6 +344,11 @@ def test_a_reader_who_has_gone_takes_no_file_away(
     monkeypatch.setattr("gestured.lab.written.say_drawn", gone)
     assert everyday("--svg", tmp_path / "curve.svg")[0] == 0
     assert (tmp_path / "curve.svg").exists()
+
+
+def test_many_false_gestures_an_hour_are_no_power_of_ten() -> None:
+    shown = str(Table("t", ("many", "all", "few"), [(1371.4, 99.6, 1.27)]))
+    assert "| 1371 | 100 | 1.3 |" in shown
 
 
 def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:
