@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
+from multiprocessing import resource_tracker
 from multiprocessing.pool import IMapIterator
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -187,8 +188,10 @@ def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: st
     others = multiprocessing.active_children()
     with ExitStack() as stack:
         with stop_later():  # a process that loses its parent while it starts ends in a traceback
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited: Ctrl-C at their start makes no traceback
+            resource_tracker.ensure_running()  # first, since to start it unblocks Ctrl-C
+            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # inherited: none makes a traceback in them
             pool = stack.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # here it has waited, and is not lost
         workers = [process for process in multiprocessing.active_children() if process not in others]
         made = pool.imap(make, todo)  # with chunks it gives a generator, which has no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)

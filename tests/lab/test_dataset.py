@@ -172,6 +172,20 @@ def test_ctrl_c_while_processes_start_makes_no_traceback(tmp_path: Path) -> None
     assert done.stdout == "1 2\n" and "Traceback" not in done.stderr
 
 
+def test_ctrl_c_while_processes_start_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take a fifth of a second to start, and then work for hours."""
+    spawn, start = type(multiprocessing.get_context("spawn")), multiprocessing.get_context("spawn").Pool
+
+    def pool(_: object, jobs: int) -> Any:
+        os.kill(os.getpid(), signal.SIGINT)
+        return start(jobs)
+
+    monkeypatch.setattr(spawn, "Pool", pool)
+    with pytest.raises(KeyboardInterrupt):
+        list(in_processes(abs, range(2), 1, ""))
+    assert multiprocessing.active_children() == []
+
+
 def killed(number: int) -> int:
     """The work of a process that the system kills, as where memory runs out."""
     if number == 1:
