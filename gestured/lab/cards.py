@@ -96,7 +96,7 @@ def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -
     apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in parts]
     return templates.get_template("card.md").render(
         name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), recordings=_recordings(path),
-        table=[*head(), *_rows(found)], others=apart,
+        public=PUBLIC_DATA, table=[*head(), *_rows(found)], others=apart,
     )  # fmt: skip
 
 

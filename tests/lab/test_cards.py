@@ -32,6 +32,8 @@ def test_a_card_names_the_recordings_and_no_others(tmp_path: Path, files: list[s
     card = (tmp_path / "cnn_lstm.md").read_text()
     assert words in card
     assert ("CapFingerId" in card) == (PUBLIC in files)
+    assert ("no textile recording was at hand" in card) == (files == [PUBLIC])
+    assert ("Circles and two-finger swipes are simulated only" in card) == (OWN not in files)
 
 
 def test_where_nobody_performed_what_is_judged_there_is_a_dash() -> None:
