@@ -9,13 +9,15 @@ from typing import Any
 import torch
 
 from gestured.client.say import say
+from gestured.core.errors import GesturedError
 from gestured.lab.cards import table, write_blocks, write_cards
 from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.export import measured, plain, write_manifest
 from gestured.lab.fit import RECURRENT
 from gestured.lab.made_of import require_marks
 from gestured.lab.own import learn as own
-from gestured.lab.train import TrainingPlan, load_data, train
+from gestured.lab.recordings.origin import origins, said
+from gestured.lab.train import REAL_FILES, TrainingPlan, load_data, train
 from gestured.lab.written import printed
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
@@ -53,6 +55,15 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
     models = {name: open_model(path) for name, path in paths.items()}  # a faulty model is found before any work
     before = {name: measured(path) for name, path in paths.items()}
+    given = {one["sha256"] for one in origins(args.recordings)}
+    for name, path in paths.items():
+        own = [one for one in said(path) or [] if one.file not in REAL_FILES]
+        if given and given != {one.sha256 for one in own}:
+            files = ", ".join(one.file for one in own) or "none"
+            raise GesturedError(
+                f"--recordings: expected the files that {name} learned from ({files}); gesturectl tune and replay "
+                "judge it by others"
+            )
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
     found = simulated_figures(models, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}

@@ -18,11 +18,12 @@ import pytest
 
 from gestured.lab.cli import FOLDERS, LAB_PACKAGES, parser
 from gestured.model.opening import open_model
-from gestured.model.shipped import LADDER
+from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 from gestured.simulator import NON_GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.conftest import Run
+from tests.small_recording import example
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -214,6 +215,15 @@ def test_a_log_on_a_full_disk_stops_nothing_and_a_terminal_need_not_have_all_let
         )
     assert done.returncode == 0
     assert "| n?\\x1b |" in done.stdout
+
+
+@pytest.mark.usefixtures("lab")
+def test_recordings_that_taught_other_models_are_not_evaluated(run: Run, tmp_path: Path) -> None:
+    """The figures would be of networks that learned from these, and would stand in the models' cards."""
+    write(tmp_path / "a.npz", example())
+    models = shipped()["cnn_lstm"].parent
+    status, _, err = run("evaluate", "--models", models, "--cache", tmp_path, "--recordings", tmp_path / "a.npz")
+    assert (status, "--recordings: expected the files that cnn_lstm learned from (none);" in err) == (1, True)
 
 
 @pytest.mark.slow
