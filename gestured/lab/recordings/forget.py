@@ -114,7 +114,7 @@ def _learned(model: Path, participant: str) -> str:
         return f"cannot be asked: {error.name} is missing: pip install 'gestured[lab]', or make lab"
     if origins is None:
         return "does not say whose recordings it learned from"
-    files = [origin.file for origin in origins if participant in origin.subjects]
+    files = [one.file for one in origins if one_spelling(participant) in map(one_spelling, one.subjects)]
     if not files:
         return f"learned from no {participant}"
     return f"learned from a {participant}, in {', '.join(files)}; weights cannot forget: train it again without them"

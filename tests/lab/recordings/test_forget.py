@@ -213,6 +213,7 @@ def test_models_say_whose_recordings_they_learned_from(path: Path, forget: Run) 
         "does not say whose recordings it learned from",
         "learned from no 07",
     ]
+    assert "a.onnx: learned from a 7, in both.npz" in forget("7", path, "--models", models, "--yes")[1]
 
 
 def test_what_is_no_model_is_told(tmp_path: Path, forget: Run) -> None:
