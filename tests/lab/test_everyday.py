@@ -111,6 +111,19 @@ def test_the_answer_to_a_touch_just_after_a_gesture_is_not_the_gestures(label: s
     assert (counts["missed"], counts["false"]) == (1, false)
 
 
+def test_a_touch_beside_the_marked_one_in_its_recording_is_false(tmp_path: Path, said: Callable[..., Any]) -> None:
+    one = session(9100, "nominal", 60.0, 0.0)
+    second = one["events"][1]
+    count = int(np.searchsorted(one["times"], second["release"] + 1.5))
+    marks = [np.searchsorted(one["times"], [second[name]]) for name in ("onset", "release")]
+    made = Recordings(
+        one["frames"][:count], one["times"][:count], np.array([0, count]), np.array([second["label"]]), np.array([0])
+    )
+    write(tmp_path / "a.npz", replace(made, onsets=marks[0], releases=marks[1]))
+    found = said("--recordings", tmp_path / "a.npz")
+    assert (found["right"], sum(of["false"] for of in found["gestures"].values())) == (1.0, 1)
+
+
 def test_one_frame_is_no_place_a_blink_is_no_hour_and_milliseconds_are_no_seconds(
     tmp_path: Path, everyday: Run, said: Callable[..., Any]
 ) -> None:

@@ -65,9 +65,10 @@ def _arrays(path: Path, place: str) -> Iterator[Stretch]:
     events = (found.event_recording, found.event_labels, found.event_onsets, found.event_offsets)
     told = [] if any(field is None for field in events) else list(zip(*events, strict=True))  # type: ignore[arg-type]
     for i, whole in enumerate(found.labels):
-        start, end = map(float, found.times_of(i)[[0, -1]])
         acts = [Performed(str(label), "", float(on), float(off)) for n, label, on, off in told if n == i]
-        if whole != SESSION:
+        if whole != SESSION:  # without marks it may have been at any time
+            marks = [end if of is None else of[i] for of, end in ((found.onsets, 0), (found.releases, -1))]
+            start, end = map(float, found.times_of(i)[marks])
             acts.append(Performed(str(whole), "", start, end))
         meant = [act for act in acts if act.label not in (NONE, UNNAMED)]
         others = [act for act in acts if act.label in (NONE, UNNAMED)]
