@@ -221,8 +221,6 @@ def _shift(status: dict[str, Any]) -> Iterator[Finding]:
     for name in status["shift"]["unlike"]:
         share = 100 * status["shift"]["outside"][name]
         what = f"{name} of {share:.0f} % of the last gestures lies outside of what the model was trained on"
-        if name == "unknown":
-            what = f"{share:.0f} % of the last touches were answered by unknown"
         yield Finding("warn", what, "check the mounting; record people here, and train with them")
 
 

@@ -22,7 +22,7 @@ from gestured.core.timing import RANGE_HZ, outside
 
 CLEAR = "\x1b[2J\x1b[H"
 REFRESH_S = 1.0
-SHIFT_NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
+SHIFT_NAMES = {"duration_s": "duration"}
 RATES = f"{RANGE_HZ[0]:.0f} to {RANGE_HZ[1]:.0f} Hz"
 SENSOR_LINES = 12  # the most sensors that get a line each; further ones are counted
 

@@ -54,7 +54,7 @@ def test_status_of_a_daemon_that_is_not_ready(daemon: Daemon) -> None:
 @pytest.mark.parametrize(
     ("shares", "unlike", "words"),
     [
-        ({"unknown": 0.24, "area": 0.0}, [], "like those of the training"),
+        ({"strength": 0.04, "area": 0.0}, [], "like those of the training"),
         ({"strength": 0.5, "duration_s": 0.4}, ["strength", "duration_s"],
          "unlike those of the training in strength (50 %), duration (40 %): gesturectl doctor says more"),
     ],

@@ -17,7 +17,7 @@ from tests.daemon.harness import Daemon, Sensor
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RULES = DEPLOY / "prometheus" / "gestured.rules.yml"
 WORDS = {
-    "sum", "rate", "by", "on", "or", "unless", "time", "increase", "changes", "histogram_quantile",
+    "sum", "rate", "by", "unless", "time", "increase", "changes", "histogram_quantile",
     "__rate_interval", "job", "h", "m", "s",
 }  # fmt: skip
 
