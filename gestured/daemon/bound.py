@@ -84,7 +84,10 @@ def bind_all(settings: Settings) -> Bound:
         gates = _listener(given, "gates", settings.gates, opened) if asked else None
         close = opened.pop_all().close
     for name, sock in given.items():
-        log.info("socket from systemd", name=name, address=sockets.name_of(sock))
+        address, key = sockets.name_of(sock), {"osc": "listen", "events": "socket"}.get(name, name)
+        log.info("socket from systemd", name=name, address=address)
+        if key in settings.model_fields_set and (value := str(getattr(settings, key))) != address:
+            log.warning("this setting is not used: systemd's unit says where", key=key, value=value, address=address)
     return Bound(udp, since, events, control, gates, http, close)
 
 

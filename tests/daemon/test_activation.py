@@ -77,6 +77,16 @@ def test_sockets_are_taken_by_name_and_survive_a_restart(model: Path, tmp_path: 
     assert "Traceback" not in daemon.stderr()
 
 
+def test_a_setting_for_which_systemd_holds_a_socket_is_said_to_be_unused(model: Path, tmp_path: Path, passed) -> None:
+    own = tmp_path / "control.sock"
+    flags = ("--listen", "0.0.0.0:9000", "--socket", tmp_path / "events.sock", "--control", own)
+    daemon = Activated.start(tmp_path, model, *flags, sockets=passed)
+    daemon.stop()
+    lines = [line for line in map(json.loads, daemon.stderr().splitlines()) if line["level"] == "warning"]
+    assert [line["key"] for line in lines] == ["listen"]  # the others are what systemd has
+    assert lines[0]["value"] == "0.0.0.0:9000" and lines[0]["address"] == daemon.ready["listen"]
+
+
 def test_what_is_sent_while_it_is_stopped_is_the_next_starts(model: Path, tmp_path: Path, passed) -> None:
     daemon = Activated.start(tmp_path, model, "--clock", "sensor", sockets=passed)
     client = daemon.client()
