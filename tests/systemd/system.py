@@ -221,7 +221,12 @@ def test_an_address_that_comes_late_is_waited_for(box: Container):
 
 
 def test_uninstall_leaves_settings_and_nothing_else(box: Container, installed: Path):
-    box.run("systemctl", "disable", "--now", "gestured.service", *SOCKETS)
+    box.path("/etc/gestured/left.toml").write_text('listen = "127.0.0.1:9001"\n')
+    box.run("systemctl", "enable", "--now", "gestured.service", "gestured@left.service")
+    (block,) = blocks("run", "tests/systemd/system.py::test_uninstall_leaves_settings_and_nothing_else")
+    box.follow(block.text.splitlines()[0])
+    assert box.run("systemctl", "list-units", "--no-legend", "--state=active", "gestured*").stdout == ""
+    assert list(box.path("/etc/systemd/system").glob("*.wants/gestured*")) == []
     root = installed.parent  # the container has taken usr out of the root
     assert (root / "usr" / "bin" / "gestured").exists()
     subprocess.run(["make", "uninstall", f"DESTDIR={root}"], cwd=ROOT, check=True, capture_output=True)
