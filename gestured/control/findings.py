@@ -232,5 +232,7 @@ def _output(status: dict[str, Any]) -> Iterator[Finding]:
         yield _dated(what, min(ages, default=None), "read in a thread of its own, and faster")
     for result, count in out["osc"].items():
         if result != "sent":
-            what, remedy = f"OSC output: {count} {result}", "does anybody listen at the --publish addresses?"
-            yield _dated(what, _ages(status, "osc").get(result), remedy)
+            remedy = "does anybody listen at the --publish addresses?"
+            if result in ("unreachable", "unresolved"):
+                remedy = "does a network lead to the --publish addresses? The installed service needs osc-output.conf"
+            yield _dated(f"OSC output: {count} {result}", _ages(status, "osc").get(result), remedy)

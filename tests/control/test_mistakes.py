@@ -179,6 +179,14 @@ def test_what_still_happens_is_a_finding_and_what_is_over_is_none(daemon: Daemon
         assert found.level == level and bool(found.remedy) == (level == "warn")
 
 
+def test_where_no_network_leads_to_a_destination_its_drop_in_is_named(daemon: Daemon) -> None:
+    status = daemon.ask("status")
+    for result, words in (("refused", "listen"), ("unreachable", "osc-output.conf"), ("unresolved", "osc-output.conf")):
+        status["output"]["osc"], status["last_s_ago"]["osc"] = {result: 3}, {result: 1.0}
+        (found,) = [found for found in examine_status(status) if f"3 {result}" in found.what]
+        assert words in found.remedy
+
+
 def test_for_how_many_hours_a_sensor_has_been_silent_is_told(daemon: Daemon) -> None:
     Sensor(daemon, "still").begin()
     awaited(daemon, "still", "ok")
