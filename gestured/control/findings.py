@@ -148,8 +148,9 @@ def _input(status: dict[str, Any]) -> Iterator[Finding]:
         what = f"{count} packets or messages dropped since the start: {reason}"
         yield _dated(what, ages.get(reason), f"they {why}")
     if status["input"]["kernel_drops"]:
-        what = f"the kernel dropped {status['input']['kernel_drops']} packets that found no room"
-        remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}, and look for a busy machine"
+        what = f"the kernel dropped {status['input']['kernel_drops']} packets"
+        remedy = "the unit's IPAddressAllow= refuses their sender, or they found no room: look for a busy machine, "
+        remedy += f"and sysctl -w net.core.rmem_max={BUFFER_BYTES}"
         yield _dated(what, _ages(status, "kernel_drops"), remedy)
     if undated := status["input"].get("implausible"):  # an older daemon does not tell
         what = f"{undated} frames were dated by their arrival, since their time tags are missing or impossible"

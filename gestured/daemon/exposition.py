@@ -34,7 +34,7 @@ def _of_the_daemon(status: Status) -> Iterator[tuple[str, str, float]]:
     yield "gestured_sensors_silent", "Sensors of which a gate is closed", sum(bool(one["closed"]) for one in sensors)
     yield "gestured_clients", "Clients of the event socket", status["output"]["subscribers"]
     yield "gestured_backlog_bytes", "Bytes that wait for slow clients", status["output"]["backlog_bytes"]
-    yield "gestured_kernel_drops_total", "Packets that found no room", status["input"]["kernel_drops"]
+    yield "gestured_kernel_drops_total", "Packets that the kernel dropped", status["input"]["kernel_drops"]
     late = "Seconds by which the event loop runs late, or reads packets late"
     yield "gestured_loop_lag_seconds", late, status["loop_lag_s"]
     rung = "Place of the model that answers: 0 is the first, 1 its first fallback"
