@@ -5,8 +5,8 @@ strength, and the quantiles of its confidence for people whom it had not seen. O
 many lie outside of a range, or below the 1 % quantile of the confidence. By chance these are 2 % (1 % for the
 confidence), but one person is no sample of all people, so only a share from UNLIKELY on is a shift. (A test of the
 whole distribution, such as the population stability index, would call every single driver a shift, since one hand
-varies less than those of a population.) The share of unknown segments does not count: in everyday life most touches are
-no gestures.
+varies less than those of a population.) The share of unknown segments is told as well, but is no shift however large it
+is: in everyday life most touches are no gestures.
 """
 
 import math
@@ -26,6 +26,7 @@ LAST = 100  # gestures
 LEAST_GESTURES = 20  # the fewest gestures from which a shift is told
 UNLIKELY = 0.2  # share outside from which it is a shift; with 2 % expected, 4 of 20 come by chance once in 1700 times
 QUANTITIES = ("strength", *MEASURES, "confidence")
+UNKNOWN = "unknown"
 
 
 class Shift:
@@ -34,7 +35,8 @@ class Shift:
     def __init__(self, quantiles: Mapping[str, Any], window: Window) -> None:
         self._window = window
         self.ranges = {name: found for name in QUANTITIES if (found := _range(quantiles, name)) is not None}
-        self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in self.ranges}
+        names = [*self.ranges, UNKNOWN] if self.ranges else []
+        self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
 
     @classmethod
     def of(cls, model: Model) -> "Shift":
@@ -42,8 +44,11 @@ class Shift:
         return cls(model.metadata.quantiles, model.metadata.window)
 
     def see(self, decided: Decided) -> None:
-        """Take a gesture that was decided, unless a fallback did, since the quantiles are another model's."""
-        if self.ranges and decided.known and not decided.scores.degraded:
+        """Take a segment that was decided, unless a fallback did, since the quantiles are another model's."""
+        if not self.ranges or decided.scores.degraded:
+            return
+        self._outside[UNKNOWN].append(not decided.known)
+        if decided.known:
             self.add(measured(decided.segment, self._window) | {"confidence": decided.scores.confidence})
 
     def add(self, seen: Mapping[str, float]) -> None:
@@ -54,10 +59,10 @@ class Shift:
     @property
     def count(self) -> int:
         """How many gestures the shares are made from."""
-        return max(map(len, self._outside.values()), default=0)
+        return max((len(self._outside[name]) for name in self.ranges), default=0)
 
     def shares(self) -> dict[str, float]:
-        """By quantity, the share outside the training range, from LEAST_GESTURES on."""
+        """By quantity, the share outside the training range, and that of `unknown`, from LEAST_GESTURES on."""
         return {
             name: sum(tuple(outside)) / len(outside)
             for name, outside in self._outside.items()
@@ -66,7 +71,7 @@ class Shift:
 
     def unlike(self) -> list[str]:
         """The quantities that do not look like the training data."""
-        return [name for name, share in self.shares().items() if share >= UNLIKELY]
+        return [name for name, share in self.shares().items() if share >= UNLIKELY and name != UNKNOWN]
 
 
 def measured(segment: Segment, window: Window) -> dict[str, float]:

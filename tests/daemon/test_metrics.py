@@ -86,7 +86,7 @@ def test_there_are_at_most_200_series_whatever_arrives(usual: dict[str, Any]) ->
     ):
         for label in labels:
             counter.add(label)
-    shift = dict.fromkeys(("strength", *MEASURES, "confidence"), 0.1)
+    shift = dict.fromkeys(("strength", *MEASURES, "confidence", "unknown"), 0.1)
     sensors = shown({name: Reading(STATES[n % len(STATES)], (9, 9)) for n, name in enumerate(names)})
     real = (Path(__file__).parent / "metrics.txt").read_text()
     gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
@@ -232,7 +232,8 @@ def test_touches_that_are_no_gestures_and_answers_of_a_fallback_are_no_shift() -
         shift.see(decided(0.4 if n % 5 else 0.9))
         shift.see(decided(0.9, degraded=True))
     assert shift.count == LAST // 5
-    assert shift.shares() == {"strength": 0.0, "duration_s": 0.0, "confidence": 0.0} and shift.unlike() == []
+    assert shift.shares() == {"strength": 0.0, "duration_s": 0.0, "confidence": 0.0, "unknown": 0.8}
+    assert shift.unlike() == []
 
 
 @pytest.mark.parametrize(
