@@ -73,13 +73,12 @@ class Subscriber:
         # Whether a daemon that says nothing must hang: one that is asked for its status tells it each second.
         self._alive = types is not None and "status" in types
         self._timeout, self._reconnect, self._say = timeout, reconnect, say
-        self._iterating = Lock()
         self._closed = False
         self._begin()
 
     def _begin(self) -> None:
-        """Be connected to nothing. A forked child needs this, since all it has is shared with its parent."""
-        self._pid = os.getpid()
+        """Be connected to nothing. A forked child shares all with its parent, of which a thread may hold the lock."""
+        self._pid, self._iterating = os.getpid(), Lock()
         self._sources = [_Source(path) for path in self._paths]
         self._unread: deque[tuple[_Source, bytes]] = deque()
         self._selector = selectors.DefaultSelector()
@@ -139,9 +138,9 @@ class Subscriber:
     def _next_line(self, end: float) -> tuple[str, dict[str, Any]] | None:
         """The next line; None once the subscriber is closed. Raises TimeoutError if none has come by `end`."""
         try:
+            if os.getpid() != self._pid:
+                self._begin()
             with self._iterating:
-                if os.getpid() != self._pid:
-                    self._begin()
                 while not self._closed:
                     if self._unread:
                         if (found := self._read(*self._unread.popleft())) is not None:

@@ -154,9 +154,10 @@ def test_close_in_a_forked_child_leaves_the_connection_to_its_parent(fake: FakeD
 
 
 def test_a_forked_child_has_a_connection_of_its_own(fake: FakeDaemon):
-    """It would otherwise take lines of its parent's, and wake for ever once its parent has closed."""
+    """It would otherwise take lines of its parent's, or wait for ever for the thread that iterates there."""
     with Subscriber(fake.path) as subscriber:
-        asked(fake, subscriber, GESTURE)
+        events = read_ahead(subscriber)
+        fake.accept()
         parents = fake.client
         child = get_context("fork").Process(target=lambda: sys.exit(next(subscriber)["sequence"]), daemon=True)
         child.start()
@@ -164,7 +165,8 @@ def test_a_forked_child_has_a_connection_of_its_own(fake: FakeDaemon):
         fake.say(GESTURE | {"sequence": 6})
         child.join()
         parents.sendall(json.dumps(GESTURE | {"sequence": 5}).encode() + b"\n")
-        assert next(subscriber)["sequence"] == 5 and child.exitcode == 6
+        event = events.get(timeout=PATIENCE_S)
+        assert event is not None and event["sequence"] == 5 and child.exitcode == 6
 
 
 def test_a_timeout_says_which_daemon_is_not_there(tmp_path: Path):
