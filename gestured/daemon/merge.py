@@ -55,7 +55,7 @@ def _from_file(path: str) -> dict[str, Any]:
 
 def _twice(data: bytes) -> str:
     """A hint for each key of a file that stands beside a table of that name, which is no TOML."""
-    text, hint = data.decode(errors="replace"), ""
+    text, hint = data.decode("utf-8-sig", "replace"), ""
     for key, (_, inner) in INSIDE.items():
         if re.search(rf"^{key}\s*=", text, re.MULTILINE) and re.search(rf"^\[{key}[].]", text, re.MULTILINE):
             hint += f"; beside a table [{key}] the key {key} is called {inner}, and stands below [{key}]"

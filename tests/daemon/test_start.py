@@ -212,7 +212,7 @@ TWO = "a = {at = [0, 0, 1, 1]}\nb = {at = [0.4, 0, 0.6, 1]}"
         ("max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ("listen = !", ("gestured.toml", "TOML", "line 1")),
         (
-            "gestures = []\n[gestures.one_tap]\nthreshold = 0.5",
+            "\ufeffgestures = []\n[gestures.one_tap]\nthreshold = 0.5",
             ("TOML", "key gestures is called use, and stands below [gestures]"),
         ),
         (
