@@ -11,6 +11,7 @@ import asyncio
 import math
 import socket
 import struct
+import sys
 import time
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -36,8 +37,8 @@ REST = 2  # seconds that the loop has for everything else, for each second that 
 SPARSE_S = 0.02  # between packets; if they are further apart, the alarm is early, and the end of a wait is met exactly
 STEP_S = 0.05  # by which the wall clock may move against the monotonic one; after a larger step, stamps are not used
 
-TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
-UNKNOWN = TIMESTAMP.pack(1 << 62, 0)  # the time of a packet for which the kernel has told none
+TIMESTAMP = struct.Struct("@ll")  # s and ns since the epoch, by the wall clock, in long integers of the machine
+UNKNOWN = TIMESTAMP.pack(sys.maxsize, 0)  # the time of a packet for which the kernel has told none
 ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
 
 
