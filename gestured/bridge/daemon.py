@@ -77,9 +77,8 @@ class Daemon:
                 self._lags.clear()  # a restarted daemon takes each sensor's clock anew
                 self._gestures(line["gestures"])
                 self.listening = dict(line.get("gates", {}))
-                unsure = line["sensors"].keys() - self.states.keys()
+                self._unsure |= line["sensors"].keys() - self.states.keys()
                 self._heard({name: self.states.get(name, "no_data") for name in line["sensors"]})
-                self._unsure = unsure
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
