@@ -87,7 +87,7 @@ def bind_all(settings: Settings) -> Bound:
         address, key = sockets.name_of(sock), {"osc": "listen", "events": "socket"}.get(name, name)
         log.info("socket from systemd", name=name, address=address)
         if key in settings.model_fields_set and (value := str(getattr(settings, key))) != address:
-            log.warning("this setting is not used: systemd's unit says where", key=key, value=value, address=address)
+            log.warning("not used, since systemd opened the socket", key=key, value=value, address=address)
     return Bound(udp, since, events, control, gates, http, close)
 
 

@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # long to import are imported only after this; some would turn an exception of a handler into an error of their own.
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: os._exit(0))
-    # Signals that other daemons know, to open their logs anew for instance, would end one that does not.
+    # Other daemons take SIGUSR1 and SIGUSR2, for instance to reopen their logs; this one would be ended by them.
     for number in (signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2):
         signal.signal(number, signal.SIG_IGN)
     # A process inherits its parent's signal mask, in which these signals may be blocked.

@@ -54,7 +54,7 @@ def _from_file(path: str) -> dict[str, Any]:
 
 
 def _twice(data: bytes) -> str:
-    """A hint for each key of a file that stands beside a table of that name, which is no TOML."""
+    """A hint for each key of a file that stands beside a table of that name, which TOML does not allow."""
     text, hint = data.decode("utf-8-sig", "replace"), ""
     for key, (_, inner) in INSIDE.items():
         if re.search(rf"^{key}\s*=", text, re.MULTILINE) and re.search(rf"^\[{key}[].]", text, re.MULTILINE):

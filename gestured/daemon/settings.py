@@ -190,7 +190,7 @@ class Settings(Part):
     _sources: Mapping[str, str] = PrivateAttr({})  # of each key that was set
 
     def with_source(self, mistake: str) -> str:
-        """A sentence that begins with the place of a setting, and before it the source of that setting."""
+        """The sentence about a mistake, which begins with a setting, and before it the source of that setting."""
         title = re.split(r"\W", mistake, maxsplit=1)[0]
         sources = [self._sources[key] for key in self._sources if TITLES.get(key, key) == title]
         return f"{' or '.join(dict.fromkeys(sources))}: {mistake}" if sources else mistake

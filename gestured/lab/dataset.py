@@ -191,7 +191,7 @@ def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: st
             resource_tracker.ensure_running()  # first, since to start it unblocks Ctrl-C
             signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # inherited: none makes a traceback in them
             pool = stack.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # here it has waited, and is not lost
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # one that came meanwhile has waited
         workers = [process for process in multiprocessing.active_children() if process not in others]
         made = pool.imap(make, todo)  # with chunks it gives a generator, which has no timeout
         yield from progress(_while_alive(made, workers), len(todo), title)

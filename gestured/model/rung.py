@@ -36,7 +36,7 @@ class Rung:
         """The rung's model. Raises ModelError."""
         if self.model is None:
             self.model = self._once(lambda: open_model(self.source))
-            if shipped_name(self.source) != str(self.source).removesuffix(".onnx"):  # a file: others look at it, too
+            if shipped_name(self.source) != str(self.source).removesuffix(".onnx"):  # a path that holds in any folder
                 self.source = os.path.abspath(self.source)
         return self.model
 

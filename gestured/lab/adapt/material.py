@@ -71,8 +71,8 @@ def own_recordings(paths: Sequence[Path], as_none: Collection[str] = ()) -> Own:
         for one, other in pairwise(sorted(names, key=one_spelling)):
             if one_spelling(one) == one_spelling(other):
                 raise RecordingError(
-                    f"{path}: subjects: expected one name for each person, found {one!r} and {other!r}; if that is one "
-                    "person, who is held out would be learned from; if not, they need names less alike"
+                    f"{path}: subjects: expected one name for each person, found {one!r} and {other!r}; if they are "
+                    "one person, nobody new would be judged; if not, give them names that differ more"
                 )
         found = _named(replace(found, subjects=people), path, as_none, left)
         for part in _sittings(found):

@@ -53,7 +53,7 @@ def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
 
 
 def recorded(path: Path, place: str = "") -> Iterator[Stretch]:
-    """The streams of a file, whose place is its name unless told. What was performed is meant; a tape does not hold it.
+    """The streams of a file, whose `place` is its name unless told. A tape does not hold what was performed.
 
     Raises RecordingError.
     """

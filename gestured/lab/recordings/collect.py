@@ -242,14 +242,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def already(path: Path, participant: str, grid: tuple[int, int]) -> Recordings | None:
-    """The recordings of an earlier session. Raises RecordingError if they are of another participant or grid.
+    """The recordings of an earlier session, if there was one.
 
-    Also if there are none, but some of a participant whose name differs in spelling alone: 7, where there is 07.
+    Raises RecordingError if they are of another participant or grid, or if another spelling has some: 07 for 7.
     """
     if not path.exists():
         like = [other for other in path.parent.glob("*.npz") if one_spelling(other.stem) == one_spelling(participant)]
         if like:
-            raise RecordingError(f"{like[0]}: is there; expected that name, or one less like it than {participant}")
+            raise RecordingError(
+                f"{like[0]}: may be of the same person; expected that name, or one less alike, found {participant!r}"
+            )
         return None
     kept = read(path)
     others = sorted(set(kept.subjects.astype(str).tolist()) - {participant})

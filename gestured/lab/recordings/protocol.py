@@ -13,7 +13,7 @@ from gestured.simulator import NONE, SPEEDS
 
 INCLINATION_NAMES = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2
 PSEUDONYM = re.compile(r"[A-Za-z0-9_-]{1,32}")
-MERE_SPELLING = re.compile(r"(?<![0-9.])0+(?=[0-9])|\.0+$")  # in a pseudonym: zeros that make no other number
+MERE_SPELLING = re.compile(r"(?<![0-9.])0+(?=[0-9])|\.0+$")  # in a pseudonym: zeros that do not change a number
 
 
 class Exercise(NamedTuple):
@@ -45,7 +45,7 @@ def pseudonym(text: str) -> str:
 
 
 def one_spelling(name: str) -> str:
-    """A pseudonym as whoever writes it otherwise may have meant it: `07`, `7` and `7.0` are alike, `A` and `a`, too."""
+    """The same text for all spellings that may mean one person: `07`, `7` and `7.0`, or `A` and `a`."""
     return MERE_SPELLING.sub("", name.casefold())
 
 

@@ -193,6 +193,6 @@ def test_a_file_that_is_somebody_elses_or_another_sensors_is_left_alone(tmp_path
         already(path, "07", (9, 9))
     kept = already(path, "07", (2, 3))
     assert kept is not None and len(kept) == 2
-    with pytest.raises(RecordingError, match=r"07\.npz: is there; expected that name, or one less like it than 7"):
+    with pytest.raises(RecordingError, match=r"07\.npz: may be of the same person; expected that name, .* found .7."):
         already(tmp_path / "7.npz", "7", (2, 3))
     assert already(tmp_path / "70.npz", "70", (2, 3)) is None
