@@ -62,9 +62,10 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     """
     early: list[str] = []  # sentences that are logged only if opening succeeds, since else the error says them
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
-    bad = [rung.refused for rung in ladder.rungs if ladder.degraded or isinstance(rung.refused, OtherGestures)]
+    refused = [rung.refused for rung in ladder.rungs]
+    bad = [one for n, one in enumerate(refused) if n < ladder.rung or isinstance(one, OtherGestures)]
     if insist and bad:
-        raise ModelError("; ".join(str(one) for one in bad if one is not None))
+        raise ModelError("; ".join(map(str, bad)))
     ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
         ladder.report(sentence)

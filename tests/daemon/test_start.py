@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.core.errors import SettingsError
+from gestured.core.errors import ModelError, SettingsError
 from gestured.daemon.asked import open_ladder
 from gestured.daemon.bound import bind_all
 from gestured.daemon.explain import explain
@@ -319,6 +319,15 @@ def test_what_the_model_does_not_know_is_said_with_its_source_as_other_mistakes(
         open_ladder(settings_of(*flags, env={"GESTURED_GESTURES": "wink"})[0])
     with pytest.raises(SettingsError, match="^.*/gestured.toml: arming.by = 'wink': is no gesture in use"):
         open_ladder(settings_of(*flags, "--own-gestures", tmp_path / "none.json")[0])
+
+
+def test_a_reload_is_not_refused_for_a_fallback_that_is_missing(model: Path, tmp_path: Path) -> None:
+    bad, missing = tmp_path / "bad.onnx", tmp_path / "missing.onnx"
+    bad.write_bytes(b"damaged")
+    with pytest.raises(ModelError, match="bad.onnx") as refused:
+        open_ladder(settings_of("--model", bad, "--fallback", model, "--fallback", missing)[0], insist=True)
+    assert "missing.onnx" not in str(refused.value)
+    assert open_ladder(settings_of("--model", model, "--fallback", missing)[0], insist=True).refused
 
 
 @pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
