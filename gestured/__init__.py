@@ -65,7 +65,7 @@ _HOMES = {
 }
 
 
-if not TYPE_CHECKING:  # to a checker it would mean that any name is one of ours
+if not TYPE_CHECKING:  # a type checker would take any name for one of the package's
 
     def __getattr__(name: str) -> object:
         from importlib import import_module

@@ -61,7 +61,7 @@ class Daemon:
         self.version = ""  # of the last daemon that was there
         self.states: dict[str, str] = {}  # by sensor, the latest news last; kept while the daemon is away
         self.gestures: list[str] | None = None  # None until the daemon has told them
-        self._unsure: set[str] = set()  # names in the hello that no status has told: perhaps of tests alone
+        self._unsure: set[str] = set()  # names that only the hello has told: perhaps of `gesturectl emit`
         self.listening: dict[str, Line] = {}  # by sensor: gates and arming, as in `status`; only if there are any
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._told = math.inf  # s since 1970, when the daemon last said its status
@@ -90,7 +90,7 @@ class Daemon:
                 held, self._told = line["time"] - self._told, line["time"]
                 if held > HELD_S:
                     self._held, self._over = held, self._told + WORKS_OFF_S
-                elif held < 0:  # the clock was set back: an event that was on its way seemed to come before its time
+                elif held < 0:  # the clock was set back, so an event on its way seemed to come before its decision
                     self._over = 0.0
                     self._lags.clear()
                 self.listening = dict(line.get("gates", {}))

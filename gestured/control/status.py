@@ -175,7 +175,7 @@ def listens(told: dict[str, Any]) -> str:
 
 
 def _shift(shift: dict[str, Any]) -> str:
-    if not shift["outside"].keys() - {"unknown"}:  # the share of touches that are no gestures says nothing of these
+    if not shift["outside"].keys() - {"unknown"}:  # the share of unknown touches says nothing about gestures
         return f"nothing to say yet ({shift['gestures']} gestures)"
     seen = f"the last {shift['gestures']} gestures are"
     if not shift["unlike"]:

@@ -189,7 +189,7 @@ def in_processes(make: Callable[[N], T], todo: Sequence[N], jobs: int, title: st
     with ExitStack() as stack:
         with stop_later():  # a process that loses its parent while it starts ends in a traceback
             resource_tracker.ensure_running()  # first, since to start it unblocks Ctrl-C
-            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # inherited: none makes a traceback in them
+            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # inherited, so that none prints a traceback
             pool = stack.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
             signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # one that came meanwhile has waited
         workers = [process for process in multiprocessing.active_children() if process not in others]

@@ -40,7 +40,7 @@ class Maker:
 
 
 def opened(path: str | Path) -> tuple[Tape, Maker]:
-    """The tape in a file, which says on standard error if its end is missing, and the daemon that made it.
+    """The tape in a file, and the daemon that made it. If the tape is cut off, standard error says so.
 
     Raises RecordingError, which names the file.
     """
