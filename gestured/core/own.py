@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from gestured.core.address import SIDES
 from gestured.core.frames import Segment
+from gestured.core.quantiles import median
 from gestured.core.timing import RANGE_HZ
-from gestured.core.window import LEAST_PEAK, Window
+from gestured.core.window import LEAST_PEAK, LONGER, SHORTER, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
@@ -61,13 +62,16 @@ class Example:
         frames = window.apply(segment)
         if not len(frames):
             return None
+        # A sensor's frames at a rate near the model's are in the window as they are.
+        slower = float(median(np.diff(segment.times))) * window.rate_hz - 1.0 if len(segment.times) > 1 else 0.0
+        rate_hz = window.rate_hz / (1.0 + slower) if -SHORTER <= slower <= LONGER else window.rate_hz
         start = float(segment.times[window.span(segment)[0]])  # s, the window's first frame
         first, last = (
-            min(max(round((t - start) * window.rate_hz), 0), len(frames) - 1) for t in (segment.onset, segment.offset)
+            min(max(round((t - start) * rate_hz), 0), len(frames) - 1) for t in (segment.onset, segment.offset)
         )
         peak = max(float(segment.frames.max()), window.floor * segment.noise, LEAST_PEAK)
         try:
-            return cls(frames.astype(np.float16), window.rate_hz, first, last, min(segment.noise / peak, 1.0))
+            return cls(frames.astype(np.float16), rate_hz, first, last, min(segment.noise / peak, 1.0))
         except ValueError:
             return None
 

@@ -121,6 +121,21 @@ def test_an_example_gives_the_window_that_the_segment_gave() -> None:
     assert np.abs(wider.apply(example.segment()) - wider.apply(performed)).mean() < 0.02
 
 
+@pytest.mark.parametrize("rate_hz", [13.5, 20, 25, 27])
+def test_an_example_at_a_rate_near_the_models_is_whole(rate_hz: float) -> None:
+    """Its window has the sensor's own frames, which are not so far apart as the model's."""
+    n = round(rate_hz)
+    frames = np.zeros((n + 6, 9, 9), np.float32)
+    frames[3 : n + 3] = np.linspace(0.1, 1, n)[:, None, None]
+    performed = Segment(frames, np.arange(n + 6) / rate_hz, 3, n + 2, 0.001)
+    example = Example.of(performed, WINDOW)
+    assert example is not None
+    window, again = WINDOW.apply(performed), WINDOW.apply(example.segment())
+    assert again.shape == window.shape
+    assert np.abs(again - window).max() < 1e-3
+    assert example.segment().offset - example.segment().onset == pytest.approx(performed.offset - performed.onset)
+
+
 def test_what_is_written_down_is_read_again() -> None:
     example = Example.of(segment(), WINDOW)
     assert example is not None
