@@ -41,11 +41,11 @@ class Counts:
         """Write a line to the log."""
         say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
 
-    def wrong(self, words: str) -> None:
-        """Count a line that no daemon sends, and log the first."""
-        if ("events", "wrong") not in self.values:
+    def wrong(self, words: str, name: str = "events", label: str = "wrong") -> None:
+        """Count a line that no daemon sends, or a command that is ignored, and log the first."""
+        if (name, label) not in self.values:
             self.say(words)
-        self.add("events", "wrong")
+        self.add(name, label)
 
     def connected(self, side: str, is_there: bool, words: str) -> None:
         """Take note of whether a side is there now, and log `words` if that has changed."""

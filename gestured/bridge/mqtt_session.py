@@ -201,7 +201,9 @@ class Mqtt:
         sensor = message.topic.split("/")[2]
         command = message.payload.decode(errors="replace")
         if message.retain or command not in (ON, OFF) or sensor not in self._daemon.states:
-            self._counts.add("commands", "retained" if message.retain else "wrong")
+            why = "it was retained" if message.retain else f"expected {ON} or {OFF}, for a known sensor"
+            words = f"{message.topic}: {command[:40]!r} is ignored: {why}"
+            self._counts.wrong(words, "commands", "retained" if message.retain else "wrong")
             return
         with self._obeying:
             waits, self._commands[sensor] = sensor in self._commands, command

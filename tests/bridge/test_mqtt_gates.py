@@ -109,7 +109,7 @@ def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, arm, house) -
 def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, arm, house) -> None:
     client = known(gated, arm)
     say(house, OFF, retain=True)  # before the bridge comes
-    _, ready = start(bridge, at, gated, "--metrics", "127.0.0.1:0")
+    process, ready = start(bridge, at, gated, "--metrics", "127.0.0.1:0")
     say(house, OFF, retain=True)
     say(house, "off")
     say(house, OFF, "gestured/car/elbow/gate/set")
@@ -124,6 +124,8 @@ def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, arm, hous
     with Control(Path(gated.ready["control"])) as operator:
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["door"]
     assert client.line()["closed"] == ["door"]
+    for ignored in ("OFF", "off"):
+        assert f"{SET}: {ignored!r} is ignored" in process.said(), "whoever sends it would look for its effect in vain"
 
 
 def test_a_bridge_gives_signs_of_life_which_change_no_gate(gated: Daemon, arm: Sensor, monkeypatch) -> None:
