@@ -297,5 +297,5 @@ def test_c_sensor(tmp_path: Path, compiler: str, standard: str):
     program = c_program(tmp_path, "gestured_packet", compiler, standard)
     packet = subprocess.run([program], capture_output=True, check=True, timeout=30).stdout
     message = OscMessage(packet)
-    assert (message.address, len(packet)) == ("/armrest/pressure", 196)
-    assert message.params == [0, b"\0\x14" + bytes(160)]
+    assert (message.address, len(packet)) == ("/armrest/pressure", 416)
+    assert message.params == [0, b"\0\x14" + bytes(382)]
