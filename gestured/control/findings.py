@@ -59,7 +59,7 @@ STATES = {
     "inverted": (
         "bad",
         "its counts fall when it is touched",
-        "[sensors.{name}] invert = true in the configuration file",
+        "[sensors.{name}] invert = true in the file of gestured --config",
     ),
 }
 
@@ -70,7 +70,8 @@ def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iter
         yield from look(status)
     if proposed:
         what = "what arrives does not fit the settings, and is dropped"
-        yield Finding("bad", what, "\n".join(["set in the configuration file, then gesturectl reload:", *proposed]))
+        remedy = ["set in the file of gestured --config, then gesturectl reload:", *proposed]
+        yield Finding("bad", what, "\n".join(remedy))
     yield from examine_sensors(status)
     for look in (_own, _shift, _output):
         yield from look(status)
@@ -196,7 +197,7 @@ def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
     if sensor.get("exchanged"):
         rows, _, columns = sensor["grid"].partition("x")
         what = f"rows and columns are exchanged: with {columns}x{rows} its touches look like a finger's"
-        yield Finding("bad", what, f'[sensors.{name}] grid = "{columns}x{rows}" in the configuration file')
+        yield Finding("bad", what, f'[sensors.{name}] grid = "{columns}x{rows}" in the file of gestured --config')
     if sensor.get("lost") and sensor["state"] != "intermittent":
         remedy = "look at the network, or at kernel drops"
         yield _dated(f"{sensor['lost']} frames lost on the way", sensor.get("lost_s_ago"), remedy)

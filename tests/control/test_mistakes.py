@@ -123,7 +123,7 @@ def test_rows_and_columns_that_are_exchanged(run, serve, tmp_path: Path) -> None
             pass
     out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
     (remedy,) = [found["remedy"] for found in of("wrong", out) if "rows and columns" in found["what"]]
-    assert '[sensors.wrong] grid = "12x6"' in remedy
+    assert '[sensors.wrong] grid = "12x6"' in remedy and "gestured --config" in remedy
     assert not any("rows and columns" in found["what"] for found in of("right", out))
 
 
