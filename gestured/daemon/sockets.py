@@ -79,8 +79,13 @@ def name_of(sock: socket.socket) -> str:
     where = sock.getsockname()
     if sock.family == socket.AF_UNIX:
         return str(where)
-    scope = where[3] if sock.family == socket.AF_INET6 else 0
-    return str(Address(f"{where[0]}%{socket.if_indextoname(scope)}" if scope else where[0], where[1]))
+    host, scope = where[0], where[3] if sock.family == socket.AF_INET6 else 0
+    if scope:
+        try:
+            host += f"%{socket.if_indextoname(scope)}"
+        except OSError:  # the interface was unplugged; it had this number
+            host += f"%{scope}"
+    return str(Address(host, where[1]))
 
 
 class Listener:

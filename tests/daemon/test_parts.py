@@ -75,6 +75,8 @@ def test_a_link_local_address_is_told_with_its_interface() -> None:
     address = name_of(bound)
     assert address == f"[fe80::1%{socket.if_indextoname(1)}]:9000"
     assert str(Address.parse(address)) == address
+    unplugged: Any = SimpleNamespace(family=socket.AF_INET6, getsockname=lambda: ("fe80::1", 9000, 0, 2**31 - 1))
+    assert name_of(unplugged) == "[fe80::1%2147483647]:9000"  # the status still comes
 
 
 def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(parts: Parts, monkeypatch, capfd) -> None:
