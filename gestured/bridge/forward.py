@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.bridge.counts import Counts
+from gestured.client.address import NUMERIC
 from gestured.client.sensor import connected, sent_after_refusal
 from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError, ProtocolError
@@ -48,7 +49,8 @@ class Forward:
         """`site` is the beginning of all keys, gestured/SITE. Raises GesturedError if `to` cannot be looked up."""
         self._site, self._counts, self._clock = site, counts, clock
         with connected(to) as found:  # a name is looked up once
-            self._to = Address(*found.getpeername()[:2])
+            host, port = socket.getnameinfo(found.getpeername(), NUMERIC)
+        self._to = Address(host, int(port))
         self._senders: dict[str, _Sender] = {}  # by name; the one heard last is at the end
         self._flooding: set[str] = set()
         self._closed = False

@@ -14,6 +14,7 @@ SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of r
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 SOCKET_PATH = f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long"
 UNIX_SOCKETS = Path("/proc/net/unix")
+NUMERIC = socket.NI_NUMERICHOST | socket.NI_NUMERICSERV  # for getnameinfo: a link-local host comes with its interface
 LISTENS = "00010000"  # the flags of a listening socket in UNIX_SOCKETS
 
 

@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from gestured.client.address import SOCKET_PATH_BYTES, bind_failure, look_up
+from gestured.client.address import NUMERIC, SOCKET_PATH_BYTES, bind_failure, look_up
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
@@ -79,13 +79,8 @@ def name_of(sock: socket.socket) -> str:
     where = sock.getsockname()
     if sock.family == socket.AF_UNIX:
         return str(where)
-    host, scope = where[0], where[3] if sock.family == socket.AF_INET6 else 0
-    if scope:
-        try:
-            host += f"%{socket.if_indextoname(scope)}"
-        except OSError:  # the interface was unplugged; it had this number
-            host += f"%{scope}"
-    return str(Address(host, where[1]))
+    host, port = socket.getnameinfo(where, NUMERIC)  # of an interface that was unplugged, it gives the number
+    return str(Address(host, int(port)))
 
 
 class Listener:

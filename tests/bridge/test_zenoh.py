@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -227,6 +228,14 @@ def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
     now += forward.SILENT_S + 1.0
     frames._to = Address("255.255.255.255", 9)  # as a network that is down, our own kernel refuses it
     assert became("d") == "unheard"
+
+
+def test_a_link_local_daemon_keeps_its_interface(monkeypatch):
+    found = MagicMock()
+    found.__enter__.return_value.getpeername = lambda: ("fe80::1", 9000, 0, 1)
+    monkeypatch.setattr(forward, "connected", lambda _: found)
+    to = Address(f"fe80::1%{socket.if_indextoname(1)}", 9000)
+    assert forward.Forward("gestured/car", to, Counts("zenoh"))._to == to
 
 
 def test_a_router_that_says_nothing_holds_up_no_end(bridge, fake, tmp_path):
