@@ -56,9 +56,10 @@ class Taps:
     def epoch_ns(self) -> int:
         """Nanoseconds from 1970 to the 0 of the loop's clock; constant while anybody taps.
 
-        So the events of a recording keep their place among its packets, even if the machine has slept meanwhile.
+        So the events of a recording keep their place among its packets, even if the machine has slept meanwhile. It is
+        never negative, as by a clock that was set back to 1970: a tape holds no time before that.
         """
-        return self._epoch_ns if self._live else time.time_ns() - time.monotonic_ns()
+        return self._epoch_ns if self._live else max(time.time_ns() - time.monotonic_ns(), 0)
 
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""

@@ -121,6 +121,8 @@ def test_what_the_flight_recorder_holds_has_one_clock_though_the_wall_clock_was_
     monkeypatch.setattr(time, "time_ns", lambda: wall() + 3600 * 10**9)
     gate, packet = map(json.loads, as_lines(taps.flight(), epoch_ns := taps.epoch_ns))
     assert gate["since"] == pytest.approx((packet["t_ns"] + epoch_ns) / 1e9, abs=1e-6)
+    monkeypatch.setattr(time, "time_ns", lambda: 0)  # set back to 1970: a tape holds no earlier time
+    assert packet["t_ns"] + taps.epoch_ns >= 0
 
 
 def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> None:
