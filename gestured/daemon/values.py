@@ -86,10 +86,15 @@ def _named(value: object, expected: str) -> Path:
 
 
 def _network(value: object) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
+    """A network; that of IPv4 for `::ffff:a.b.c.d`, as a socket at [::] tells IPv4 senders."""
     try:
-        return ipaddress.ip_network(_text(value), strict=False)
+        network = ipaddress.ip_network(_text(value), strict=False)
+        if getattr(network.network_address, "scope_id", None) is not None:
+            raise ValueError  # no packet says its interface, so that this would let in nobody
     except ValueError:
         raise ValueError("an address or a network, such as 127.0.0.1, 192.168.7.0/24 or fd00::/8") from None
+    mapped = getattr(network.network_address, "ipv4_mapped", None)
+    return network if mapped is None else ipaddress.IPv4Network((mapped, network.prefixlen - 96))
 
 
 def _typed(expected: str) -> BeforeValidator:

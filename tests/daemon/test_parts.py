@@ -16,6 +16,7 @@ import pytest
 
 from gestured.control.findings import examine_status
 from gestured.core.address import Address
+from gestured.core.errors import SettingsError
 from gestured.core.events import Gate
 from gestured.core.hub import REMEMBERED
 from gestured.core.scene import Scene
@@ -55,6 +56,13 @@ def test_lists_are_written_with_commas_or_repeated() -> None:
     assert [str(a) for a in settings.publish] == ["osc://127.0.0.1:1", "osc://[::1]:2"]
     assert settings.allow == (ipaddress.ip_network("10.0.0.0/8"), ipaddress.ip_network("::1/128"))
     assert settings.gestures == ("one_tap", "swipe_left")
+
+
+def test_allow_takes_ipv4_senders_as_a_socket_at_both_families_tells_them() -> None:
+    settings, _ = load_settings({}, {"GESTURED_ALLOW": "::ffff:192.168.7.9, ::ffff:10.9.0.0/120"})
+    assert settings.allow == (ipaddress.ip_network("192.168.7.9"), ipaddress.ip_network("10.9.0.0/24"))
+    with pytest.raises(SettingsError, match="expected an address or a network"):
+        load_settings({}, {"GESTURED_ALLOW": "fe80::1%eth0"})  # no packet says its interface
 
 
 def test_the_allow_list_knows_mapped_and_scoped_addresses() -> None:
