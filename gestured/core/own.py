@@ -5,6 +5,7 @@ any model can make its own embedding of it.
 """
 
 import base64
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +17,7 @@ from gestured.core.address import SIDES
 from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 from gestured.core.timing import RANGE_HZ
-from gestured.core.window import LEAST_PEAK, LONGER, SHORTER, Window
+from gestured.core.window import LEAST_PEAK, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
@@ -62,9 +63,8 @@ class Example:
         frames = window.apply(segment)
         if not len(frames):
             return None
-        # A sensor's frames at a rate near the model's are in the window as they are.
-        slower = float(median(np.diff(segment.times))) * window.rate_hz - 1.0 if len(segment.times) > 1 else 0.0
-        rate_hz = window.rate_hz / (1.0 + slower) if -SHORTER <= slower <= LONGER else window.rate_hz
+        usual = float(median(np.diff(segment.times))) if len(segment.times) > 1 else math.inf
+        rate_hz = 1.0 / usual if window.keeps(usual) else window.rate_hz
         start = float(segment.times[window.span(segment)[0]])  # s, the window's first frame
         first, last = (
             min(max(round((t - start) * rate_hz), 0), len(frames) - 1) for t in (segment.onset, segment.offset)

@@ -105,6 +105,11 @@ class Window:
         horizontal = _resize(columns, left, side, self.columns)
         return np.asarray(vertical @ frames @ horizontal.T)
 
+    def keeps(self, usual: float) -> bool:
+        """Whether frames that are usually so many seconds apart are taken as they are."""
+        step = 1.0 / self.rate_hz
+        return -SHORTER * step <= usual - step <= LONGER * step
+
     def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
         """Frames at `rate_hz`, by time stamps: averaged if the sensor is faster, interpolated if it is slower.
 
@@ -117,7 +122,7 @@ class Window:
         step = 1.0 / self.rate_hz
         steps = np.diff(times)
         flat = frames.reshape(len(frames), -1)
-        if -SHORTER * step <= usual - step <= LONGER * step:
+        if self.keeps(usual):
             missing = np.maximum(np.rint(steps / min(usual, step)).astype(int), 1)
             at = np.concatenate([[0], np.cumsum(missing)])
             if at[-1] + 1 == len(flat):
