@@ -136,13 +136,13 @@ def compared(here: Iterator[str], there: Iterator[str], but: str) -> int:
     return events
 
 
-def alike(older: str, newer: str, lines: str) -> bool:
-    """Whether the codes of two digests decide alike, by one line of same.txt or by several, one after the other."""
-    pairs = [line.split()[:2] for line in lines.splitlines() if not line.startswith("#")]
-    known = {newer}
-    while more := {before for now, before in pairs if now in known} - known:
+def alike(one: str, other: str, lines: str) -> bool:
+    """Whether the codes of two digests decide alike, by one line of same.txt or by several that share codes."""
+    pairs = [set(line.split()[:2]) for line in lines.splitlines() if not line.startswith("#")]
+    known = {one}
+    while more := {code for pair in pairs if pair & known for code in pair} - known:
         known |= more
-    return older in known
+    return other in known
 
 
 def main() -> None:
