@@ -162,6 +162,11 @@ def router() -> Row:
                 with session("client", "connect/endpoints", endpoint) as receiver:
                     came: list[str] = []
                     hears = receiver.declare_subscriber("gestured/**", lambda sample: came.append(str(sample.key_expr)))
+                    while not came:  # until the router knows of the subscriber, it has nobody to send to
+                        sender.put("gestured/first", b"")
+                        time.sleep(0.01)
+                    time.sleep(0.1)  # for the last of these
+                    came.clear()
                     used, begin = cpu_s_of(started.pid), time.monotonic()
                     for n in range(NAMES):
                         sender.put(f"gestured/site{n % 100}/s{n}/gesture", payload)
