@@ -108,9 +108,10 @@ def test_a_table_of_other_models_or_of_other_code_is_listed(tmp_path: Path) -> N
 
 
 def test_code_that_decides_as_other_code_did_makes_no_table_older() -> None:
-    lines = "# NOW BEFORE\nnow before 2026-11-28\nbefore first 2026-11-27\nother now 2026-11-29\n"
-    assert all(alike(older, "now", lines) for older in ("now", "before", "first"))
-    assert not alike("other", "now", lines) and not alike("now", "before", lines) and not alike("BEFORE", "NOW", lines)
+    lines = "# NOW BEFORE\nnow first 2026-11-28\nsecond first 2026-11-27\nother another 2026-11-29\n"
+    assert all(alike(one, "now", lines) for one in ("now", "first", "second"))  # two that decide as a third do so alike
+    assert not any(alike(one, "now", lines) for one in ("other", "another", "BEFORE"))
+    assert not alike("NOW", "BEFORE", lines)
 
 
 def test_two_checkouts_decide_alike_if_no_event_differs(tmp_path: Path) -> None:
