@@ -77,7 +77,7 @@ class Subscriber:
         self._begin()
 
     def _begin(self) -> None:
-        """Be connected to nothing. A forked child shares all with its parent, of which a thread may hold the lock."""
+        """Start without connections and with a new lock, also in a forked child, which would share its parent's."""
         self._pid, self._iterating = os.getpid(), Lock()
         self._sources = [_Source(path) for path in self._paths]
         self._unread: deque[tuple[_Source, bytes]] = deque()
